@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::zone::{DAY, TextError, SECOND};
+use crate::zone::{DAY, SECOND, TextError};
 
 /// Reads hours as a range of milliseconds since the beginning of the day. The range ends on the
 /// next day if its end is not later than its start: `22 to 6`.

@@ -9,8 +9,8 @@ use elbowroom_calendar::{Calendar, Origin};
 use crate::args::CalendarArgs;
 use crate::exit::Failure;
 use crate::file;
-use crate::terminal::{HINT, styled};
 use crate::output::{self, Output};
+use crate::terminal::{HINT, styled};
 use elbowroom_executive::clock::{self, Clock};
 
 /// A problem with the timed initials of a calendar.

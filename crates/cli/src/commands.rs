@@ -2,6 +2,7 @@
 
 pub(crate) mod check;
 pub(crate) mod compare;
+pub(crate) mod completions;
 pub(crate) mod ctl;
 pub(crate) mod envelope;
 pub(crate) mod export;
@@ -12,7 +13,6 @@ pub(crate) mod plan;
 pub(crate) mod report;
 pub(crate) mod run;
 pub(crate) mod serve;
-pub(crate) mod completions;
 pub(crate) mod stn;
 mod threads;
 pub(crate) mod val;

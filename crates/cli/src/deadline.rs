@@ -5,7 +5,7 @@ use std::sync::mpsc::{self, RecvTimeoutError};
 use std::thread;
 use std::time::Duration;
 
-use elbowroom::answers::{StopRequest, Observer};
+use elbowroom::answers::{Observer, StopRequest};
 
 use crate::time_limit::Stopwatch;
 
@@ -26,10 +26,12 @@ pub(crate) fn run_with_deadline<T: Send + 'static>(
 ) -> T {
     let (sender, receiver) = mpsc::channel();
     let theirs = work.clone();
-    let worker = thread::Builder::new().stack_size(STACK_SIZE).spawn(move || {
-        // After the time limit, the receiver is gone.
-        let _ = sender.send(theirs());
-    });
+    let worker = thread::Builder::new()
+        .stack_size(STACK_SIZE)
+        .spawn(move || {
+            // After the time limit, the receiver is gone.
+            let _ = sender.send(theirs());
+        });
     if worker.is_err() {
         // No thread is available: the limit is checked between steps only.
         return work();

@@ -16,8 +16,8 @@ pub(crate) use elbowroom::AnyPlan;
 use crate::args::ProblemArgs;
 use crate::calendar::timed_problem;
 use crate::exit::Failure;
-use crate::terminal::{HINT, styled};
 use crate::output::{self, Output};
+use crate::terminal::{HINT, styled};
 use elbowroom_executive::journal::Journal;
 
 /// Reads domain and problem. Warnings go to standard error.
@@ -85,7 +85,8 @@ pub(crate) fn any_plan(
 }
 
 /// Advice if a plan with fixed times is needed and an STN plan is given.
-pub(crate) const FIXED_TIMES_ADVICE: &str = "give a plan with fixed times; its network is made from it";
+pub(crate) const FIXED_TIMES_ADVICE: &str =
+    "give a plan with fixed times; its network is made from it";
 
 /// Reads a plan with fixed times. `advice` is shown if the file is an STN plan.
 pub(crate) fn time_triggered(

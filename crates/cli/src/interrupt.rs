@@ -74,7 +74,11 @@ impl Interrupt {
 /// the time since the first one. The third signal always ends it. The second one does unless it is
 /// the same request or a world is being stopped.
 fn must_exit(number: u32, since_first: Duration, has_world: bool) -> bool {
-    let patience = if has_world { SHUTDOWN_TIME } else { DEBOUNCE_TIME };
+    let patience = if has_world {
+        SHUTDOWN_TIME
+    } else {
+        DEBOUNCE_TIME
+    };
     match number {
         0 | 1 => false,
         2 => since_first >= patience,

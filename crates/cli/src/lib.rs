@@ -4,21 +4,21 @@
 //! does all input and output of the workspace; the library does the computations.
 
 mod args;
-mod panic_hook;
 mod calendar;
 mod commands;
+mod deadline;
 mod exit;
 mod file;
-mod deadline;
 mod input;
 mod interrupt;
 mod limits;
-mod terminal;
 mod number;
 mod output;
+mod panic_hook;
 mod progress;
-mod time_limit;
 mod table;
+mod terminal;
+mod time_limit;
 mod wrap;
 
 use std::ffi::OsString;

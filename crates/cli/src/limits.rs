@@ -9,7 +9,7 @@
 use elbowroom::answers::envelope::LimitGroup;
 use unicode_width::UnicodeWidthStr;
 
-use crate::terminal::{SECONDARY, TextLayout, EMPHASIS, styled};
+use crate::terminal::{EMPHASIS, SECONDARY, TextLayout, styled};
 
 /// Renders the limits, one reason after the other; empty without limits.
 pub(crate) fn render(limits: &[LimitGroup], look: TextLayout) -> String {

@@ -1,3 +1,3 @@
 //! Formatting of exact numbers.
 
-pub(crate) use elbowroom::report::decimal::{Rounding, rounded_inwards, nearest, rounded};
+pub(crate) use elbowroom::report::decimal::{Rounding, nearest, rounded, rounded_inwards};

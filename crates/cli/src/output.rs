@@ -111,7 +111,11 @@ pub(crate) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     }
     std::fs::write(path, bytes).map_err(|error| {
         Failure::new(
-            format!("cannot write {}: {}", path.display(), io_error_message(&error)),
+            format!(
+                "cannot write {}: {}",
+                path.display(),
+                io_error_message(&error)
+            ),
             "choose a file in a folder that exists and that you may write to",
         )
     })

@@ -16,8 +16,8 @@ use std::fmt::Write as _;
 use elbowroom::num::{End, Interval, Rational};
 use unicode_width::UnicodeWidthStr;
 
-use crate::terminal::{SECONDARY, TextLayout, EMPHASIS, WARNING, styled};
 use crate::number::{self, Rounding};
+use crate::terminal::{EMPHASIS, SECONDARY, TextLayout, WARNING, styled};
 
 /// A row of the table.
 #[derive(Clone, Debug)]

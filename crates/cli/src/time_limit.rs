@@ -4,12 +4,12 @@
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use elbowroom::answers::{Event, StopRequest, Observer};
+use elbowroom::answers::{Event, Observer, StopRequest};
 use elbowroom::num::Rational;
 
 use crate::interrupt::Interrupt;
-use crate::terminal::{ERROR, styled};
 use crate::output;
+use crate::terminal::{ERROR, styled};
 use elbowroom_executive::clock::Clock;
 
 /// A clock since the start, with the reasons for which a computation ends early.

@@ -199,7 +199,11 @@ fn invalid_world_programs_end_the_run_and_are_reported() {
 
 /// Runs with a world like `examples/world.py` that sends the line `first` at the start of its first
 /// answer.
-fn example_world_with_first_line(name: &str, first: &str, options: &[&str]) -> Option<(Output, String)> {
+fn example_world_with_first_line(
+    name: &str,
+    first: &str,
+    options: &[&str],
+) -> Option<(Output, String)> {
     if Command::new("python3").arg("--version").output().is_err() {
         return None;
     }
@@ -229,7 +233,9 @@ fn every_fact_of_the_problem_may_be_reported() {
         ("now-true", "(LIES parcel depot)", "true"),
     ] {
         let first = format!(r#"{{"type":"fact","fact":"{fact}","becomes":{truth},"time":0}}"#);
-        let Some((output, trace)) = example_world_with_first_line(name, &first, &["--strict-world"]) else {
+        let Some((output, trace)) =
+            example_world_with_first_line(name, &first, &["--strict-world"])
+        else {
             skipped("there is no python3");
             return;
         };

@@ -154,7 +154,8 @@ fn run_with_seed_is_reproducible() {
         std::fs::remove_file(&trace).unwrap();
         let trace = reply.trace.expect("a run has a trace");
         assert_eq!(trace, written);
-        let page = reply_to(&json!({ "ask": "page", "of": { "name": "run.jsonl", "text": trace } }));
+        let page =
+            reply_to(&json!({ "ask": "page", "of": { "name": "run.jsonl", "text": trace } }));
         assert!(
             page.page
                 .expect("a trace has a page")

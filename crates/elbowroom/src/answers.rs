@@ -23,6 +23,7 @@ pub mod check;
 pub mod envelope;
 mod format;
 pub mod learn;
+mod observer;
 pub mod odds;
 pub mod plan;
 pub mod region;
@@ -30,13 +31,15 @@ pub mod repair;
 pub mod run;
 pub mod stn;
 mod violation;
-mod observer;
 
 pub use check::{CheckAnswer, CheckRequest};
 pub use elbowroom_report::exact::{self, Exact};
 pub use envelope::{EnvelopeAnswer, EnvelopeOutcome, EnvelopeRequest};
 pub use format::Version;
 pub use learn::{LearnAnswer, LearnRequest};
+pub use observer::{
+    EnvelopeProgress, Event, NoObserver, Observer, PlanProgress, StopRequest, TrialsProgress,
+};
 pub use odds::{OddsAnswer, OddsRequest};
 pub use plan::{PlanAnswer, PlanOutcome, PlanRequest};
 pub use region::{RegionAnswer, RegionOutcome};
@@ -44,7 +47,6 @@ pub use repair::{RepairAnswer, RepairOutcome, RepairRequest};
 pub use run::{RunAnswer, RunOutcome, RunProgress, RunRequest};
 pub use stn::{StnAnswer, StnOutcome, StnRequest};
 pub use violation::ViolationAnswer;
-pub use observer::{EnvelopeProgress, Event, StopRequest, PlanProgress, TrialsProgress, NoObserver, Observer};
 
 use crate::box_text::BoxTextError;
 use crate::duration_distributions::DistributionError;

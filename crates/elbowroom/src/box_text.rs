@@ -339,7 +339,10 @@ mod tests {
         assert!(matches!(error("=[1,2]"), BoxTextError::Syntax { .. }));
         assert!(matches!(error("d0=±-1"), BoxTextError::Syntax { .. }));
         assert!(matches!(error("d0=[1,2"), BoxTextError::Syntax { .. }));
-        assert!(matches!(error("all=±1 all=±2"), BoxTextError::Duplicate { .. }));
+        assert!(matches!(
+            error("all=±1 all=±2"),
+            BoxTextError::Duplicate { .. }
+        ));
         assert!(matches!(error("d0=[7]"), BoxTextError::Syntax { .. }));
         assert!(matches!(error("d0=[1,x]"), BoxTextError::Syntax { .. }));
         assert!(matches!(error("d0=[inf,1]"), BoxTextError::Syntax { .. }));

@@ -1,7 +1,7 @@
 //! Distributions of the durations of a plan in a world, for the box with the greatest probability.
 
 use elbowroom_num::Rational;
-use elbowroom_num::log_concave::{LogConcaveDistribution, Density};
+use elbowroom_num::log_concave::{Density, LogConcaveDistribution};
 use elbowroom_plan::{ParameterKind, ParametrizedPlan};
 use elbowroom_sim::{Distribution, Rule, WorldModel};
 
@@ -78,7 +78,11 @@ pub fn duration_distribution(
 
 /// Returns the distribution of a duration by a rule; `None` if a parameter of the rule is not
 /// finite.
-fn distribution_of_rule(rule: &Rule, planned: &Rational, resolution: &Rational) -> Option<LogConcaveDistribution> {
+fn distribution_of_rule(
+    rule: &Rule,
+    planned: &Rational,
+    resolution: &Rational,
+) -> Option<LogConcaveDistribution> {
     let exact = Rational::from_f64_as_written;
     let scale = if rule.is_relative {
         planned.clone()

@@ -1,8 +1,8 @@
 //! Descriptions of results about a plan in words.
 
+mod adversary;
 mod conflict;
 mod control;
-mod adversary;
 mod timed;
 
 pub(crate) use conflict::KnownConflicts;

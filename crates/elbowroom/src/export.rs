@@ -58,8 +58,8 @@ use elbowroom_plan::{
 
 use crate::answers::envelope::{self, EnvelopeFinding, Range};
 use crate::answers::{EnvelopeAnswer, EnvelopeRequest};
-use crate::pipeline::PipelineError;
 use crate::linear_form::LinearForm;
+use crate::pipeline::PipelineError;
 
 /// Largest number of positions that are distinguished for a moment inside an action.
 const MOST_POSITIONS: usize = 4_096;

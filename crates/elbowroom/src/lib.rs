@@ -161,26 +161,28 @@
 
 pub mod answers;
 mod box_text;
+pub mod dot;
 mod duration_distributions;
 pub mod execute;
 pub mod executive;
 mod explain;
 pub mod export;
-pub mod pipeline;
 mod given_plan;
-pub mod dot;
 mod linear_form;
 mod makespan;
 pub mod network;
 pub mod no_plan;
+mod pinning;
+pub mod pipeline;
 mod plan_file;
 mod plan_text;
-mod pinning;
 mod rounding;
 pub mod timed;
 
 pub use box_text::{BoxTextError, parse_box, write_box};
-pub use duration_distributions::{DistributionError, duration_distribution, duration_distributions};
+pub use duration_distributions::{
+    DistributionError, duration_distribution, duration_distributions,
+};
 pub use elbowroom_envelope as envelope;
 pub use elbowroom_execution as execution;
 pub use elbowroom_external as external;

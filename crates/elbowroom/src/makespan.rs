@@ -32,7 +32,10 @@ pub(crate) fn last_end(plan: &TimeTriggeredPlan) -> Rational {
 /// schedules; `None` if there are none at all.
 ///
 /// A plan that works only for other durations has at most the weak guarantee.
-pub(crate) fn with_fixed_choices(plan: &ParametrizedPlan, network: Network) -> Option<ConsistentNetwork> {
+pub(crate) fn with_fixed_choices(
+    plan: &ParametrizedPlan,
+    network: Network,
+) -> Option<ConsistentNetwork> {
     let mut told = network.clone();
     for constraint in &plan.plan.constraints {
         if let Some(duration) = plan.commanded_duration(constraint) {

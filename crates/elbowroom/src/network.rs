@@ -28,7 +28,8 @@ use elbowroom_num::Rational;
 use elbowroom_stn::uncertain::Dispatchable;
 
 pub use answer::{
-    Answer, ViolatedRequirement, LinkDuration, Number, ControllabilityCheck, Reason, Simulated, Step, Time, Verdict,
+    Answer, ControllabilityCheck, LinkDuration, Number, Reason, Simulated, Step, Time, Verdict,
+    ViolatedRequirement,
 };
 pub use elbowroom_network::*;
 pub use simulate::{Durations, Simulation, SimulationError};

@@ -146,7 +146,11 @@ pub fn with_any_ends(situation: &Situation) -> Situation {
 }
 
 /// Proposes a certificate, which the verifier has not checked yet.
-fn propose_certificate(task: &Task, situation: &Situation, effort: &mut Effort<'_>) -> Result<NoPlan, String> {
+fn propose_certificate(
+    task: &Task,
+    situation: &Situation,
+    effort: &mut Effort<'_>,
+) -> Result<NoPlan, String> {
     let instances = Instances::from(task, situation);
     let mut instances = instances.map_err(|flaw| flaw.to_string())?;
     let reached = add_reachable(&mut instances, effort)?;
@@ -185,7 +189,10 @@ fn propose_certificate(task: &Task, situation: &Situation, effort: &mut Effort<'
 }
 
 /// Adds the reachable instances of actions, and returns the facts that they reach.
-fn add_reachable(instances: &mut Instances, effort: &mut Effort<'_>) -> Result<ReachedFacts, String> {
+fn add_reachable(
+    instances: &mut Instances,
+    effort: &mut Effort<'_>,
+) -> Result<ReachedFacts, String> {
     let too_many =
         || "there are too many instances of actions to list the facts they reach".to_owned();
     let mut reached = ReachedFacts::new();

@@ -13,7 +13,8 @@ use elbowroom_envelope::soundness::{Broken, SoundBox, broken_in};
 use elbowroom_model::Task;
 use elbowroom_num::{End, Interval, Rational};
 use elbowroom_plan::deorder::{
-    keeps_all_that_is_read, pin_until_sound, with_permanent_sides, with_compatible_sides, without_sides,
+    keeps_all_that_is_read, pin_until_sound, with_compatible_sides, with_permanent_sides,
+    without_sides,
 };
 use elbowroom_plan::{
     Bound, BoxEnd, Constraint, DecoupledEnvelope, InstanceId, Node, NodeId, Parameter, ParameterId,

@@ -14,7 +14,7 @@ use elbowroom_sim::WorldModel;
 use elbowroom_stn::ConsistentNetwork;
 
 use crate::answers::envelope::{Search, envelope};
-use crate::answers::{EnvelopeOutcome, EnvelopeRequest, RequestError, NoObserver};
+use crate::answers::{EnvelopeOutcome, EnvelopeRequest, NoObserver, RequestError};
 use crate::pinning;
 
 /// The quantities to vary, and the settings of the search.

@@ -11,7 +11,9 @@
 
 use elbowroom_envelope::{RepairLimits, RepairRun, repair};
 use elbowroom_model::problem::Comparison;
-use elbowroom_model::validate::{self, ViolationKind, Reason as Because, Settings, Verdict, Violation};
+use elbowroom_model::validate::{
+    self, Reason as Because, Settings, Verdict, Violation, ViolationKind,
+};
 use elbowroom_model::{Step, Task, TimeTriggeredPlan};
 use elbowroom_num::{End, Interval, Rational};
 use elbowroom_pddl::{
@@ -303,9 +305,11 @@ fn demanded_duration(violation: &Violation) -> Option<(usize, &Rational)> {
 fn is_about_numbers(violation: &Violation) -> bool {
     match &violation.kind {
         ViolationKind::Duration { .. } => true,
-        ViolationKind::Condition { reasons, .. } | ViolationKind::Constraint { reasons, .. } => reasons
-            .iter()
-            .any(|reason| matches!(reason, Because::Comparison { .. })),
+        ViolationKind::Condition { reasons, .. } | ViolationKind::Constraint { reasons, .. } => {
+            reasons
+                .iter()
+                .any(|reason| matches!(reason, Because::Comparison { .. }))
+        }
         _ => false,
     }
 }

@@ -47,22 +47,22 @@
 //! every agent succeeds in it at least as often. Probabilities are floating-point numbers; the
 //! bounds are widened by 1e-9, which is far more than the rounding errors.
 
-mod upper_bound;
 mod action_model;
+mod action_subsets;
 mod applicable;
-mod lower_bound;
 mod cell_probabilities;
 mod compile;
+mod discrete_events;
 mod failures;
 mod graph;
-mod relaxed_world;
-mod discrete_events;
-mod value_intervals;
+mod lower_bound;
 mod policy;
 mod projection;
-mod action_subsets;
-mod state;
+mod relaxed_world;
 mod restricted_policy;
+mod state;
+mod upper_bound;
+mod value_intervals;
 mod world;
 
 use elbowroom_model::Task;
@@ -71,9 +71,9 @@ use elbowroom_sim::WorldModel;
 use serde::{Deserialize, Serialize};
 
 pub(crate) use action_model::{ActionModel, Event, Needs};
+pub use action_subsets::supported;
 pub(crate) use cell_probabilities::{CellProbabilities, EndProbabilities};
 pub use policy::Policy;
-pub use action_subsets::supported;
 pub use restricted_policy::RestrictedPolicy;
 pub(crate) use world::{Facts, TimedWorld};
 
@@ -195,7 +195,12 @@ pub fn optimum(
     let world = TimedWorld::new(task, model, settings);
     let horizon = world.as_ref().ok().map(|world| world.horizon);
     let mut search = restricted_policy::Search::new(task, model, settings, horizon);
-    search.refine(1.0, settings.most_states / FIRST_STATES_DIVISOR, settings, goes_on);
+    search.refine(
+        1.0,
+        settings.most_states / FIRST_STATES_DIVISOR,
+        settings,
+        goes_on,
+    );
     if search.best.is_some() && 1.0 - search.lower() <= settings.gap {
         return Ok(TimedOptimum {
             lower: search.lower(),
@@ -208,7 +213,9 @@ pub fn optimum(
         lower: search.lower(),
         ..TimedOptimum::unknown()
     };
-    if let Some(found) = discrete_events::bounds(&world, settings, discrete_events::Effort::WHOLE, goes_on)? {
+    if let Some(found) =
+        discrete_events::bounds(&world, settings, discrete_events::Effort::WHOLE, goes_on)?
+    {
         let grid = found.grid;
         known.lower = known.lower.max(grid.lower);
         known.upper = grid.upper;
@@ -366,11 +373,16 @@ fn bound(
     let world = &world.for_bound(side);
     Ok(match side {
         Side::Above => {
-            let value = graph::value(&upper_bound::UpperBound::new(world, &chances), left, goes_on);
+            let value = graph::value(
+                &upper_bound::UpperBound::new(world, &chances),
+                left,
+                goes_on,
+            );
             value.map(|value| (value + ROUNDING_MARGIN).min(1.0))
         }
         Side::Below => {
-            let below = lower_bound::LowerBound::new(world, &chances, lower_bound::DecisionEpochs::Always);
+            let below =
+                lower_bound::LowerBound::new(world, &chances, lower_bound::DecisionEpochs::Always);
             let value = graph::value(&below, left, goes_on);
             value.map(|value| (value - ROUNDING_MARGIN).max(0.0))
         }

@@ -11,7 +11,7 @@ use elbowroom::answers::plan as planning;
 use elbowroom::answers::plan::{PlanFinding, PlanOutcome, PlanRequest, PlanStop};
 use elbowroom::answers::stn::{StnFinding, StnRequest, stn};
 use elbowroom::answers::{EnvelopeAnswer, EnvelopeOutcome, EnvelopeRequest, Exact};
-use elbowroom::answers::{Event, StopRequest, NoObserver, Observer};
+use elbowroom::answers::{Event, NoObserver, Observer, StopRequest};
 use elbowroom::execute::PlanPreparer;
 use elbowroom::execution::run::TimeoutRule;
 use elbowroom::execution::{PlanForm, Preparer};
@@ -126,7 +126,8 @@ fn invalid_plan_is_answered_with_its_violation() {
     let (task, plan) = read_with("delivery", "0: (drive rover depot shelf) [10]");
     let outcome = envelope_of(&EnvelopeRequest::new(&task, plan.clone()));
     assert!(outcome.plan.is_none() && outcome.envelope.is_none());
-    let EnvelopeFinding::Fails(NominalFailure::Invalid { violation }) = &outcome.answer.finding else {
+    let EnvelopeFinding::Fails(NominalFailure::Invalid { violation }) = &outcome.answer.finding
+    else {
         panic!("{:?}", outcome.answer)
     };
     let judged = check(&CheckRequest {

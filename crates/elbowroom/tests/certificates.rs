@@ -12,14 +12,14 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use elbowroom::answers::envelope::{EnvelopeFinding, EnvelopeRequest, Relax, Search, envelope};
-use elbowroom::answers::{EnvelopeOutcome, StopRequest, NoObserver, Observer};
+use elbowroom::answers::{EnvelopeOutcome, NoObserver, Observer, StopRequest};
 use elbowroom::envelope::{BestSettings, Guarantee, Method, Objective};
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
 use elbowroom::pddl::read_plan;
 use elbowroom::plan::ParametrizedPlan;
 use elbowroom::verify::sound::{Control, FailureCase, Schedules, Sound, Violation};
-use elbowroom::verify::{AnswerError, Certificate, Flaw, Verified, with_sums, verify_answer};
+use elbowroom::verify::{AnswerError, Certificate, Flaw, Verified, verify_answer, with_sums};
 use elbowroom::{AnyPlan, pddl};
 use judge::{certificate_in, is_about_the_box};
 use serde_json::Value;

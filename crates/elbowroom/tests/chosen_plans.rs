@@ -12,18 +12,18 @@ use elbowroom::answers::plan::{
     BestPlanRequest, PlanAim, PlanChoice, PlanFinding, PlanOutcome, PlanStop, PlanValue, best_plan,
 };
 use elbowroom::answers::run::{RunRequest, simulate};
-use elbowroom::answers::{StopRequest, NoObserver, Observer};
+use elbowroom::answers::{NoObserver, Observer, StopRequest};
 use elbowroom::execute::{
-    Candidates, Choice, PlanSelector, Embedded, Execution, FirstPlan, WorldKnowledge, Limits, NamedText,
-    Replanning, Rollouts, RunSpec, Value,
+    Candidates, Choice, Embedded, Execution, FirstPlan, Limits, NamedText, PlanSelector,
+    Replanning, Rollouts, RunSpec, Value, WorldKnowledge,
 };
 use elbowroom::execution::run::{PlanningTime, RunSettings, Verdict};
 use elbowroom::execution::{Entry, Planner, Recorder};
-use elbowroom::pipeline;
 use elbowroom::model::validate::{Settings, validate};
 use elbowroom::model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 use elbowroom::pddl::{self, Source};
+use elbowroom::pipeline;
 use elbowroom::probability::{Likelihoods, likelihoods};
 use elbowroom::sim::WorldModel;
 
@@ -149,7 +149,10 @@ fn search_ends_with_its_budget_and_names_the_option() {
         };
         planner.settings.threads = threads;
         let answer = planner.plan(&task, &Situation::initial(&task)).answer;
-        answer.failure_reason().expect("there is no plan").to_owned()
+        answer
+            .failure_reason()
+            .expect("there is no plan")
+            .to_owned()
     };
     let little = why(1_000_000, 1);
     assert!(little.contains("--planning-budget"), "{little}");

@@ -176,7 +176,9 @@ fn trajectory_constraint_holds_throughout_the_box() {
                 assert!(verdict.is_valid(), "{form}\n{text}{verdict:?}");
                 // Some would be invalid without the constraints between happenings.
                 let mut loose = fixed.clone();
-                loose.constraints.retain(|one| one.reason != Reason::TrajectoryConstraint);
+                loose
+                    .constraints
+                    .retain(|one| one.reason != Reason::TrajectoryConstraint);
                 if let Some(schedule) = shared::draw::schedule(&loose, &valuation, &mut rng) {
                     let verdict =
                         validate(&task, &loose.scheduled(&schedule), &Settings::default());

@@ -146,7 +146,8 @@ fn same_envelope(task: &Task, plan: &TimeTriggeredPlan, name: &str) -> bool {
         ..pipeline::Settings::default()
     };
     let mut analyst = PlanPreparer::new(settings.clone());
-    let ready = (plan.steps.len() <= LONG).then(|| analyst.prepare(&task, plan, PlanForm::Envelope));
+    let ready =
+        (plan.steps.len() <= LONG).then(|| analyst.prepare(&task, plan, PlanForm::Envelope));
     let Some(Ok(ready)) = ready else { return false };
     if !keeps_all_that_is_read(&task, &ready.plan, &ready.nominal) {
         return false;

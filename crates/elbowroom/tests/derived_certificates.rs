@@ -33,7 +33,7 @@ use elbowroom::answers::envelope::{EnvelopeRequest, envelope};
 use elbowroom::envelope::{BestSettings, Guarantee, Method, Objective};
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::pddl::{self, read_plan};
-use elbowroom::verify::{AnswerError, Certificate, with_sums, verify_answer_of};
+use elbowroom::verify::{AnswerError, Certificate, verify_answer_of, with_sums};
 use forgery::{Forger, claim, tightened};
 use serde_json::{Value, json};
 use shared::own::case;

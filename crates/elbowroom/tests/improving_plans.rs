@@ -10,7 +10,7 @@ use elbowroom::answers::plan::{
     BetterPlan, ImprovingPlans, ImprovingPlansRequest, NextPlan, PlanFinding, PlanRequest,
     PlanStop, plan,
 };
-use elbowroom::answers::{StopRequest, NoObserver, Observer};
+use elbowroom::answers::{NoObserver, Observer, StopRequest};
 use elbowroom::model::Task;
 use elbowroom::model::validate::{Settings, Verdict, validate};
 use elbowroom::num::Rational;

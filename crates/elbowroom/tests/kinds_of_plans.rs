@@ -13,7 +13,7 @@ use elbowroom::plan::{
     BoxEnd, DecoupledEnvelope, NodeId, ParametrizedPlan, Schedule, Valuation, format, network_node,
 };
 use elbowroom::stn::ConsistentNetwork;
-use elbowroom::{pipeline, parse_box};
+use elbowroom::{parse_box, pipeline};
 use kinds::{Kind, kinds};
 use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};
@@ -247,7 +247,11 @@ fn the_order_of_the_lines_of_a_plan_does_not_matter() {
         let lines: Vec<&str> = kind.plan.lines().collect();
         for text in orders(&lines) {
             let (task, plan) = kind.read_with(&text);
-            assert!(validate_plan(&task, &plan).is_valid(), "{}:\n{text}", kind.name);
+            assert!(
+                validate_plan(&task, &plan).is_valid(),
+                "{}:\n{text}",
+                kind.name
+            );
             let (found, times) = opened(&task, &plan);
             let here = format!("{}:\n{text}", kind.name);
             assert_eq!(found.plan.constraints, open.plan.constraints, "{here}");

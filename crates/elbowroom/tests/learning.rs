@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use elbowroom::answers::NoObserver;
 use elbowroom::answers::learn::{
-    ConformalBox, LearntDurations, ConformalRequest, LearnAnswer, LearnRequest, Log, Settings,
+    ConformalBox, ConformalRequest, LearnAnswer, LearnRequest, LearntDurations, Log, Settings,
     Verdict, learn,
 };
 use elbowroom::answers::run::{RunRequest, run as answer_run, simulate};

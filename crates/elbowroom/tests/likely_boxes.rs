@@ -11,7 +11,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use elbowroom::answers::envelope::{Best, EnvelopeFinding, EnvelopeRequest, envelope};
-use elbowroom::answers::{EnvelopeOutcome, RequestError, NoObserver};
+use elbowroom::answers::{EnvelopeOutcome, NoObserver, RequestError};
 use elbowroom::envelope::{BestSettings, Guarantee, Method, Objective};
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
@@ -161,7 +161,10 @@ fn most_likely_box_beats_irr_and_random_boxes() {
     let (task, plan) = case("delivery");
     let likely = answered(&request(&task, plan.clone(), AROUND));
     let best_one = best(&likely).probability.clone().expect("a probability");
-    let chances = elbowroom::duration_distributions(likely.plan.as_ref().expect("a plan"), &world(AROUND, &task));
+    let chances = elbowroom::duration_distributions(
+        likely.plan.as_ref().expect("a plan"),
+        &world(AROUND, &task),
+    );
     let chances = chances.expect("normal distributions");
     let resolution = Rational::new(1, 1000);
     for method in [Method::Irr, Method::Best] {

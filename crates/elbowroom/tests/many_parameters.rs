@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use elbowroom::answers::envelope::{EnvelopeFinding, envelope};
-use elbowroom::answers::{EnvelopeRequest, StopRequest, NoObserver, Observer};
+use elbowroom::answers::{EnvelopeRequest, NoObserver, Observer, StopRequest};
 use elbowroom::{AnyPlan, pipeline};
 use elbowroom_envelope::{Guarantee, Method, Oracle, Settings, irr};
 use elbowroom_model::{Task, TimeTriggeredPlan};
@@ -125,11 +125,18 @@ fn interrupted_search_returns_partial_result_soon() {
         request.search.method = Some(method);
         let mut widest = Rational::ZERO;
         for left in [1, 2, 5, 20, 60, 100, 200, 500, 2_000, usize::MAX] {
-            let mut patience = PollLimit { remaining_polls: left, polls_after_limit: 0 };
+            let mut patience = PollLimit {
+                remaining_polls: left,
+                polls_after_limit: 0,
+            };
             let outcome = envelope(&request, &mut patience);
             let place = format!("{needs:?} {method} after {left}");
             // Each part of the remaining work polls once.
-            assert!(patience.polls_after_limit <= 12, "{place}: {}", patience.polls_after_limit);
+            assert!(
+                patience.polls_after_limit <= 12,
+                "{place}: {}",
+                patience.polls_after_limit
+            );
             let outcome = outcome.expect(&place);
             let found = outcome.envelope.expect(&place);
             let width = (0..20).map(|index| {

@@ -24,7 +24,7 @@ use elbowroom::pddl::read_problem;
 use elbowroom::planner::{Answer, Settings, plan};
 use elbowroom::text::Source;
 use elbowroom::verify::Exact;
-use elbowroom::verify::no_plan::{MutexPair, Kind, NoPlan, NoPlanFlaw, verify_no_plan};
+use elbowroom::verify::no_plan::{Kind, MutexPair, NoPlan, NoPlanFlaw, verify_no_plan};
 use game::Random;
 
 fn task(domain: &str, problem: &str) -> Task {

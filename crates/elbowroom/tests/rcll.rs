@@ -38,7 +38,12 @@ const RESOURCE_PLAN: &str = "
     410.006: (deliver_order r0 ow0 o0) [1.000]";
 
 /// Returns the deordered plan with some parameters.
-fn opened(domain: &Path, problem: &Path, plan: &str, specs: &[&str]) -> Result<Case, PipelineError> {
+fn opened(
+    domain: &Path,
+    problem: &Path,
+    plan: &str,
+    specs: &[&str],
+) -> Result<Case, PipelineError> {
     let task = shared::task(domain, problem).expect("a readable problem");
     let (plan, _) = read_plan(&Source::new("plan", plan), &task).expect("a readable plan");
     let specs: Result<Vec<VarySpec>, _> = specs.iter().map(|spec| spec.parse()).collect();

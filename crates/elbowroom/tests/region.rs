@@ -12,7 +12,7 @@ use elbowroom::AnyPlan;
 use elbowroom::answers::region::{
     Others, PictureError, Plane, RegionFinding, RegionSettings, picture, region,
 };
-use elbowroom::answers::{EnvelopeRequest, StopRequest, RegionOutcome, NoObserver, Observer};
+use elbowroom::answers::{EnvelopeRequest, NoObserver, Observer, RegionOutcome, StopRequest};
 use elbowroom::envelope::{Guarantee, Oracle};
 use elbowroom::model::Task;
 use elbowroom::num::{Interval, Rational};

@@ -21,7 +21,9 @@ use std::sync::{Arc, Mutex};
 
 use elbowroom::execute::{Embedded, Execution};
 use elbowroom::execution::run::{PlanningTime, RunSettings};
-use elbowroom::execution::{Subject, Cause, Decided, Decision, Entry, PreparedPlan, GuaranteeLevel, Recorder};
+use elbowroom::execution::{
+    Cause, Decided, Decision, Entry, GuaranteeLevel, PreparedPlan, Recorder, Subject,
+};
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 use elbowroom::pddl;

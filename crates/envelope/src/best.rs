@@ -14,14 +14,14 @@
 //! - [`Objective::Probability`]: the same with the logarithm of a probability, and with cases for
 //!   values that have a probability of their own ([`probability`]).
 
-mod concave_maximum;
 mod barrier;
 mod branch;
+mod concave_maximum;
 mod leximin;
-mod objective;
-mod master;
-mod probability;
 mod log_probability;
+mod master;
+mod objective;
+mod probability;
 mod volume;
 
 use std::fmt;
@@ -299,7 +299,11 @@ impl Variables {
     }
 
     /// Returns the variables with their values in a box.
-    fn values_of(&self, nominal: &DecoupledEnvelope, envelope: &DecoupledEnvelope) -> Vec<BoxVariable> {
+    fn values_of(
+        &self,
+        nominal: &DecoupledEnvelope,
+        envelope: &DecoupledEnvelope,
+    ) -> Vec<BoxVariable> {
         let all = self.ends.iter().zip(&self.scales).zip(&self.max_distances);
         all.map(|((ends, scale), most)| {
             let far = ends[0].reach(envelope).zip(ends[0].reach(nominal));

@@ -19,7 +19,7 @@ use elbowroom_plan::{
 };
 use elbowroom_stn::ConstraintId;
 use elbowroom_stn::uncertain::{
-    Ground as StepGround, LinkId, Part, Refutation, Refuted, StrongConflict, RefutationPath,
+    Ground as StepGround, LinkId, Part, Refutation, RefutationPath, Refuted, StrongConflict,
 };
 
 use crate::cut::{Cut, EndSum, Ground, Length, ProofPart, ProofPath};
@@ -131,7 +131,10 @@ pub(crate) fn strategy_cuts(
 }
 
 /// Returns the conflict that prevents strong controllability in the box.
-pub(crate) fn fixed_time_cuts(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> CheckOutcome {
+pub(crate) fn fixed_time_cuts(
+    plan: &ParametrizedPlan,
+    envelope: &DecoupledEnvelope,
+) -> CheckOutcome {
     let Ok(network) = plan.uncertain_network(envelope) else {
         return CheckOutcome::Unknown;
     };
@@ -171,7 +174,11 @@ pub(crate) fn fixed_time_cuts(plan: &ParametrizedPlan, envelope: &DecoupledEnvel
     outcome_from(vec![total], Ground::Fixed(parts), envelope)
 }
 
-fn outcome_from(alternatives: Vec<EndSum>, ground: Ground, envelope: &DecoupledEnvelope) -> CheckOutcome {
+fn outcome_from(
+    alternatives: Vec<EndSum>,
+    ground: Ground,
+    envelope: &DecoupledEnvelope,
+) -> CheckOutcome {
     match cut(alternatives, ground, envelope) {
         Some(cut) => CheckOutcome::Cuts(vec![cut]),
         None => CheckOutcome::Unknown,
@@ -328,7 +335,8 @@ impl Reader<'_> {
         let (Bound::Parameter(parameter), false) = (own, is_told) else {
             return Some((fixed, origin));
         };
-        if constraint.lower == constraint.upper && self.plan.plan.is_controlled_by_world(constraint) {
+        if constraint.lower == constraint.upper && self.plan.plan.is_controlled_by_world(constraint)
+        {
             // A second duration that ends at the same node.
             return None;
         }

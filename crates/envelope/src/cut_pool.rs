@@ -99,7 +99,11 @@ impl CutPool {
     pub(crate) fn set_current_box(&mut self, envelope: &DecoupledEnvelope) {
         if self.current_box.as_ref() != Some(envelope) {
             self.commit();
-            self.slack = self.rows.iter().map(|row| row_slack(row, envelope)).collect();
+            self.slack = self
+                .rows
+                .iter()
+                .map(|row| row_slack(row, envelope))
+                .collect();
             self.current_box = Some(envelope.clone());
         }
     }

@@ -162,7 +162,11 @@ mod tests {
     use super::*;
 
     /// Returns `true` if edges other than the parameter's own lead from one class to another.
-    fn is_reachable(edges: &[Edge], (from, to): (ClassId, ClassId), parameter: ParameterId) -> bool {
+    fn is_reachable(
+        edges: &[Edge],
+        (from, to): (ClassId, ClassId),
+        parameter: ParameterId,
+    ) -> bool {
         let (mut seen, mut stack) = (Vec::new(), vec![from]);
         while let Some(class) = stack.pop() {
             if class == to {

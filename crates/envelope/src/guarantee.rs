@@ -10,8 +10,8 @@ use elbowroom_stn::corner_search::TooManyBranches;
 use serde::{Deserialize, Serialize};
 
 use crate::control::{ControlConflict, DynamicControl, strong_conflict};
-use crate::feasibility::{Feasibility, Infeasible, MAX_BRANCHES};
 use crate::cut_generation::{CheckOutcome, fixed_time_cuts, schedule_cut, strategy_cuts};
+use crate::feasibility::{Feasibility, Infeasible, MAX_BRANCHES};
 use crate::objection::Objection;
 use crate::obligations::Refusal;
 use crate::reduction::Reduction;

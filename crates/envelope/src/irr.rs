@@ -1,8 +1,8 @@
 //! Incremental Rectangular Robustification.
 
-mod speculative;
-mod parameter_bounds;
 mod conflict_split;
+mod parameter_bounds;
+mod speculative;
 
 use std::ops::ControlFlow;
 use std::sync::Arc;

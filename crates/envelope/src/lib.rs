@@ -57,10 +57,11 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod uniform_slack;
 mod best;
 mod control;
 mod cut;
+mod cut_generation;
+mod cut_pool;
 mod cycles;
 mod enforce;
 mod exact;
@@ -68,30 +69,30 @@ mod feasibility;
 mod frontier;
 mod guarantee;
 mod irr;
-mod cut_pool;
-mod cut_generation;
+mod line_search;
 pub mod linear;
 mod method;
 mod objection;
 pub mod obligations;
 mod oracle;
 mod proof;
-mod line_search;
 pub mod reduction;
 mod repair;
 mod row;
 mod sharpen;
 pub mod soundness;
+mod uniform_slack;
 
-pub use uniform_slack::{UniformSlack, DeviationBounds, max_uniform_slack};
 pub use best::{
-    BestProof, BestRun, BestSettings, BestStep, ProofCase, BoxVariable, LOG_OF_ZERO, Objective, OptimalityProof, BoundSource,
-    BlockedVariable, TangentPoint, best, volume_foot,
+    BestProof, BestRun, BestSettings, BestStep, BlockedVariable, BoundSource, BoxVariable,
+    LOG_OF_ZERO, Objective, OptimalityProof, ProofCase, TangentPoint, best, volume_foot,
 };
 pub use control::{ControlConflict, ControlGround};
 pub use cut::{Cut, Ground, ProofPart, ProofPath};
 pub use enforce::with_obligations;
-pub use exact::{BoundedRegion, Component, ExactError, Polygon, Piece, Region, RegionRow, RegionSource, exact};
+pub use exact::{
+    BoundedRegion, Component, ExactError, Piece, Polygon, Region, RegionRow, RegionSource, exact,
+};
 pub use frontier::Growth;
 pub use guarantee::Guarantee;
 pub use irr::{IrrRun, Limit, Settings, StopReason, Widening, irr, limits};
@@ -99,9 +100,10 @@ pub use method::Method;
 pub use objection::Objection;
 pub use oracle::Oracle;
 pub use proof::{
-    ConditionProof, ControlProof, RefutedCase, Refutation, ScheduleCase, Strategy, Summand,
-    TimeRule, ImpossibilityProof,
+    ConditionProof, ControlProof, ImpossibilityProof, Refutation, RefutedCase, ScheduleCase,
+    Strategy, Summand, TimeRule,
 };
-pub use repair::{Changeable, BindingConstraint, Repair, RepairLimits, RepairRun, repair};
+pub use repair::{BindingConstraint, Changeable, Repair, RepairLimits, RepairRun, repair};
 pub use row::Row;
 pub use sharpen::sharpen;
+pub use uniform_slack::{DeviationBounds, UniformSlack, max_uniform_slack};

@@ -164,10 +164,7 @@ impl LineSearch {
 
     /// Returns the greatest number up to `most` that satisfies a cut.
     fn cut_limit(&self, cut: &Cut, most: &Rational) -> Option<Rational> {
-        let left = cut
-            .rows
-            .iter()
-            .filter_map(|row| self.row_limit(row, most));
+        let left = cut.rows.iter().filter_map(|row| self.row_limit(row, most));
         left.max()
     }
 

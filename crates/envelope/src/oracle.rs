@@ -1,7 +1,7 @@
 //! The exact box check.
 
-mod proofs;
 mod cut_generation;
+mod proofs;
 
 use std::sync::Arc;
 
@@ -10,8 +10,8 @@ use elbowroom_num::Rational;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan, Valuation};
 
 use crate::control::{beyond_all_bounds, strong_conflict};
-use crate::guarantee::{Controllability, Guarantee, Uncontrollable};
 use crate::cut_pool::CutPool;
+use crate::guarantee::{Controllability, Guarantee, Uncontrollable};
 use crate::objection::Objection;
 use crate::obligations::Refusal;
 use crate::soundness::{Broken, Conditions, Counterexample, Soundness};
@@ -367,7 +367,10 @@ impl Oracle {
     }
 
     /// Checks a box that may be unrelated to the previous one.
-    fn check_from_scratch(&mut self, envelope: &DecoupledEnvelope) -> Result<Option<Reason>, Refusal> {
+    fn check_from_scratch(
+        &mut self,
+        envelope: &DecoupledEnvelope,
+    ) -> Result<Option<Reason>, Refusal> {
         self.checks += 1;
         let reason = self.sound_and_controllable(envelope, None, None);
         self.proofs_hold_in_last = matches!(&reason, Ok(None));

@@ -32,7 +32,7 @@ use elbowroom_stn::{ConsistentNetwork, Constraint};
 
 use crate::obligations::{Refusal, Requirement};
 use crate::reduction::Reduction;
-use defect::{DefectFinder, Defect};
+use defect::{Defect, DefectFinder};
 use orders::Orders;
 use program::{Program, Solved};
 
@@ -191,7 +191,10 @@ pub fn repair(
     let mut hopeless: Option<Vec<BindingConstraint>> = None;
     while let Some(case) = take_cheapest(&mut open) {
         let cost = &case.solved.cost.real;
-        let is_dear = limits.cost_limit.as_ref().is_some_and(|below| cost >= below);
+        let is_dear = limits
+            .cost_limit
+            .as_ref()
+            .is_some_and(|below| cost >= below);
         let is_over = is_dear || cases > limits.cases;
         if is_over || flow().is_break() {
             return Ok(RepairRun::Stopped {

@@ -1,6 +1,6 @@
 //! Linear inequalities in the ends of boxes.
 
-use elbowroom_num::{Rational, Accumulator};
+use elbowroom_num::{Accumulator, Rational};
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope};
 
 use crate::linear::Terms;

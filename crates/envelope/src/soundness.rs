@@ -7,7 +7,6 @@
 //! and they are stored. When a box is widened, only proofs that use the moved end and no longer
 //! hold are searched again.
 
-mod violation_case;
 mod certificate;
 mod corner;
 mod flow;
@@ -15,9 +14,10 @@ mod half_space;
 mod lazy_network;
 mod linear_program;
 mod proof;
+mod proof_export;
 mod scale;
 mod sound_box;
-mod proof_export;
+mod violation_case;
 
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
@@ -26,12 +26,12 @@ use elbowroom_stn::ConsistentNetwork;
 use crate::linear::Linear;
 use crate::obligations::{BadCase, Difference, Obligations, OverAll, Refusal, Requirement};
 use crate::reduction::Reduction;
-use violation_case::Outcome;
 use certificate::Certificate;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, NodeId, ParametrizedPlan, Schedule, Valuation};
 use lazy_network::{LazyNetwork, numbers};
 use proof::Proof;
 use scale::Numbers;
+use violation_case::Outcome;
 
 pub use sound_box::SoundBox;
 

@@ -5,9 +5,9 @@ use std::ops::ControlFlow;
 use elbowroom_num::Rational;
 use elbowroom_plan::{DecoupledEnvelope, Side};
 
+use crate::line_search::LineSearch;
 use crate::obligations::Refusal;
 use crate::oracle::Oracle;
-use crate::line_search::LineSearch;
 
 /// Greatest deviation that is searched, as a multiple of the nominal value.
 const MAX_DEVIATION: i64 = 10;
@@ -72,5 +72,9 @@ pub fn max_uniform_slack(
         return Ok(None);
     };
     let either = share(&Side::BOTH)?;
-    Ok(either.map(|either| UniformSlack { increase: more, decrease: less, both_directions: either }))
+    Ok(either.map(|either| UniformSlack {
+        increase: more,
+        decrease: less,
+        both_directions: either,
+    }))
 }

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
 use elbowroom_envelope::{BestRun, BestSettings, Guarantee, LOG_OF_ZERO, Objective, Oracle, best};
-use elbowroom_num::log_concave::{LogConcaveDistribution, Density};
+use elbowroom_num::log_concave::{Density, LogConcaveDistribution};
 use elbowroom_num::{Interval, Rational, enclosures};
 use elbowroom_plan::{DecoupledEnvelope, ParameterId, ParametrizedPlan};
 
@@ -50,7 +50,8 @@ fn number(tenths: i64) -> Rational {
 
 fn dense(density: Density, cuts: [Option<i64>; 2]) -> LogConcaveDistribution {
     let [minimum, maximum] = cuts.map(|cut| cut.map(number));
-    LogConcaveDistribution::dense(density, minimum, maximum, &Rational::new(1, 1000)).expect("a density")
+    LogConcaveDistribution::dense(density, minimum, maximum, &Rational::new(1, 1000))
+        .expect("a density")
 }
 
 fn values(tenths: &[i64]) -> LogConcaveDistribution {
@@ -146,7 +147,8 @@ fn logarithm(
         let (lower, upper) = (interval.lower.value()?, interval.upper.value()?);
         let key = (index, lower.clone(), upper.clone());
         let own = known.entry(key).or_insert_with(|| {
-            let [mass, _] = chance.probability_bounds(&nominal, &[&nominal - lower, upper - &nominal]);
+            let [mass, _] =
+                chance.probability_bounds(&nominal, &[&nominal - lower, upper - &nominal]);
             enclosures::ln(&mass).map(|[below, _]| below.to_f64())
         });
         sum += (*own)?;

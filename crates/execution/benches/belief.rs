@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use elbowroom_execution::{BeliefState, ActionHandle};
+use elbowroom_execution::{ActionHandle, BeliefState};
 use elbowroom_model::ground::{
     Action, Body, Change, Condition, DurativeBody, Effect, FactId, Guard, SnapAction,
 };

@@ -21,9 +21,10 @@ use std::fmt::Write;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use elbowroom_execution::executors::{ExecutorSpec, PolicyTableCache, ExecutorServices};
+use elbowroom_execution::executors::{ExecutorServices, ExecutorSpec, PolicyTableCache};
 use elbowroom_execution::{
-    Decision, Ending, Executor, PreparedPlan, DecisionContext, PlanEvent, Order, BeliefState, StepId, ActionHandle,
+    ActionHandle, BeliefState, Decision, DecisionContext, Ending, Executor, Order, PlanEvent,
+    PreparedPlan, StepId,
 };
 use elbowroom_model::ground::Action;
 use elbowroom_model::{Task, TimeTriggeredPlan};
@@ -140,7 +141,9 @@ impl World {
 
     fn start(&mut self, order: Order) {
         let duration = order.duration.expect("all take time");
-        self.belief.advance_for_happening(&self.now).expect("no numbers");
+        self.belief
+            .advance_for_happening(&self.now)
+            .expect("no numbers");
         let ticket = ActionHandle(u64::from(order.step.0));
         let started = self.belief.start(ticket, &order.action, &duration, &[]);
         started.expect("no numbers");
@@ -162,7 +165,9 @@ impl World {
         }
         let ((time, step), _) = self.running.pop_first().expect("something to wait for");
         self.now.clone_from(&time);
-        self.belief.advance_for_happening(&time).expect("no numbers");
+        self.belief
+            .advance_for_happening(&time)
+            .expect("no numbers");
         let ended = self.belief.end(ActionHandle(u64::from(step.0)), &[]);
         ended.expect("no numbers");
         self.news.push(PlanEvent::Ended {

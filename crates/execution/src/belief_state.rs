@@ -8,13 +8,13 @@
 //! invalid, which the validator reports.
 
 mod effects;
+mod evaluation;
 mod goal;
 mod motion;
+mod over_all;
 mod parts;
 mod polynomial;
-mod evaluation;
 mod start;
-mod over_all;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -25,12 +25,12 @@ use elbowroom_model::ground::{
 use elbowroom_model::{RunningAction, State, Task};
 use elbowroom_num::{Interval, Rational};
 
-pub(crate) use goal::GoalStatus;
-pub use parts::{Guards, BeliefStateParts, RunningActionParts};
 pub use evaluation::EvaluationError;
+pub(crate) use goal::GoalStatus;
+pub use parts::{BeliefStateParts, Guards, RunningActionParts};
 pub(crate) use start::conditions_on_duration;
 
-use crate::event::{Measured, ActionHandle};
+use crate::event::{ActionHandle, Measured};
 use motion::{Motion, Rate};
 
 /// The state at one moment, with the running actions.
@@ -265,7 +265,8 @@ impl BeliefState {
         match &action.body {
             Body::Instantaneous(snap) => self.apply_effects(snap, None, None, measured),
             Body::Durative(body) => {
-                let guards = |condition: &Condition| self.holds_on_arrival(condition, Some(planned));
+                let guards =
+                    |condition: &Condition| self.holds_on_arrival(condition, Some(planned));
                 let end_guards = body.end.effects.iter();
                 let continuous = body.continuous.iter();
                 let underway = RunningActionState {
@@ -291,7 +292,11 @@ impl BeliefState {
     ///
     /// # Errors
     /// As [`Progression::start`].
-    pub fn end(&mut self, ticket: ActionHandle, measured: &[Measured]) -> Result<(), EvaluationError> {
+    pub fn end(
+        &mut self,
+        ticket: ActionHandle,
+        measured: &[Measured],
+    ) -> Result<(), EvaluationError> {
         let Some(underway) = self.running.remove(&ticket) else {
             return Ok(());
         };
@@ -414,7 +419,11 @@ impl BeliefState {
 
     /// Returns a running action in the form of the model, with its guards decided. Before its end,
     /// it reads the planned duration.
-    pub fn running_action(&self, underway: &RunningActionState, duration: Interval) -> RunningAction {
+    pub fn running_action(
+        &self,
+        underway: &RunningActionState,
+        duration: Interval,
+    ) -> RunningAction {
         let planned = underway.action.with_planned_duration(&underway.planned);
         let mut action = planned.unwrap_or_else(|| Action::clone(&underway.action));
         if let Body::Durative(body) = &mut action.body {
@@ -507,7 +516,10 @@ fn to_u32(index: usize) -> u32 {
 }
 
 /// Removes the doubts about an action, and returns the facts and fluents.
-fn without_doubts<T: Copy + Ord>(doubts: &mut BTreeMap<T, Vec<Doubt>>, ticket: ActionHandle) -> Vec<T> {
+fn without_doubts<T: Copy + Ord>(
+    doubts: &mut BTreeMap<T, Vec<Doubt>>,
+    ticket: ActionHandle,
+) -> Vec<T> {
     let mut found = Vec::new();
     doubts.retain(|&about, doubts| {
         let before = doubts.len();

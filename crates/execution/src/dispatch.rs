@@ -5,17 +5,17 @@
 //! are fixed in the network. With a whole [`Horizon`], this updates the windows of all others,
 //! including deadlines. The work per event is proportional to the number of windows that change.
 
-mod interference;
+mod decide;
 mod explain;
+mod interference;
 mod observe;
 mod overrun;
 mod progress;
 mod projection;
 mod retry;
-mod decide;
 
-pub(crate) use overrun::{Overdue, EndAssumption};
 pub(crate) use decide::{in_words, replan};
+pub(crate) use overrun::{EndAssumption, Overdue};
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -23,16 +23,16 @@ use std::sync::Arc;
 use elbowroom_model::Task;
 use elbowroom_model::ground::{Action, Body, DurationConstraint};
 use elbowroom_num::Rational;
-use elbowroom_plan::uncertain::{Impossible, PlanNetwork, ConstraintRole};
+use elbowroom_plan::uncertain::{ConstraintRole, Impossible, PlanNetwork};
 use elbowroom_plan::{
     Bound, Constraint, InstanceId, Node, NodeId, Schedule, StnPlan, network_node,
 };
 use elbowroom_stn::{ConsistentNetwork, Network};
 
-use crate::executor::{PreparedPlan, Planned, StepId};
-use crate::window_propagation::{WindowPropagation, NetworkLimit, constraints_of_steps};
-use crate::reason::{Subject, Evidence, Cause, Reason};
+use crate::executor::{Planned, PreparedPlan, StepId};
+use crate::reason::{Cause, Evidence, Reason, Subject};
 use crate::separation::Separation;
+use crate::window_propagation::{NetworkLimit, WindowPropagation, constraints_of_steps};
 use overrun::BoundViolations;
 use progress::PlanProgress;
 use retry::Retry;
@@ -241,7 +241,9 @@ impl Dispatch {
         // The executor does not decide when a running action ends, so ends have no lower bound at
         // `now`.
         let waits = |what: Node| !matches!(what, Node::End(_));
-        let plan = self.plan.remainder(now, |node| self.execution_time(node), waits);
+        let plan = self
+            .plan
+            .remainder(now, |node| self.execution_time(node), waits);
         plan.uncertain_network(&|constraint| {
             if constraint.from == NodeId::ZERO && constraint.reason == elbowroom_plan::Reason::Given
             {
@@ -290,7 +292,10 @@ impl Dispatch {
         now: &Rational,
         reading: &dyn Fn(&Constraint) -> ConstraintRole,
     ) -> Option<ConsistentNetwork> {
-        let rest = self.remaining_network(&self.to_plan_time(now), reading).ok()?.network;
+        let rest = self
+            .remaining_network(&self.to_plan_time(now), reading)
+            .ok()?
+            .network;
         let mut network = rest.requirements().clone();
         for link in rest.links() {
             let (from, to) = (link.activation, link.end);
@@ -363,7 +368,8 @@ impl Dispatch {
             let start = self.ends[id.index()][0];
             // The plan contains the remainder of a running action, which begins with the plan.
             let _ = self.horizon.fix(network_node(start), &Rational::ZERO);
-            self.progress.record_execution(&self.plan, start, &Rational::ZERO);
+            self.progress
+                .record_execution(&self.plan, start, &Rational::ZERO);
             self.progress.ready.remove(&start);
             self.progress.running.insert(id);
         }

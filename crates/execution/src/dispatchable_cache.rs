@@ -59,7 +59,10 @@ impl DispatchableCache {
         }
         let found = match network.into_executable() {
             Ok(form) => CachedForm::Controllable(Arc::new(form)),
-            Err((network, conflict)) => CachedForm::NotControllable(Arc::new(network), constraints_of_steps(&conflict.steps)),
+            Err((network, conflict)) => CachedForm::NotControllable(
+                Arc::new(network),
+                constraints_of_steps(&conflict.steps),
+            ),
         };
         let form = found.form();
         let mut known = known();

@@ -8,9 +8,9 @@ use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 use elbowroom_plan::{DecoupledEnvelope, InstanceId, ParametrizedPlan, PartialOrderPlan, Schedule};
 
-use crate::event::{Ending, Measured, ActionHandle};
-use crate::dispatchable_cache::DispatchableCache;
 use crate::belief_state::BeliefState;
+use crate::dispatchable_cache::DispatchableCache;
+use crate::event::{ActionHandle, Ending, Measured};
 use crate::reason::Reason;
 
 /// The form of a plan that an executor requires, from the least to the most preparation.

@@ -5,14 +5,14 @@
 //! generated from that list.
 
 mod adaptable;
-mod happening_choice;
 mod esterel;
 mod fixed;
+mod guarantee_status;
 mod guarded;
+mod happening_choice;
 mod live;
 mod lookahead;
 mod policy;
-mod guarantee_status;
 mod stn;
 
 use std::fmt;
@@ -25,12 +25,12 @@ use elbowroom_probability::Likelihoods;
 pub use adaptable::OrderCache;
 pub use lookahead::PolicyTableCache;
 
+use crate::action_values::ActionValues;
 use crate::executor::PlanForm;
 use crate::executor::{Decided, Decision, Executor};
 use crate::plan_comparison::PlanComparator;
-use crate::action_values::ActionValues;
 use crate::preparation::RegionOracle;
-use crate::reason::{Subject, Cause, Reason};
+use crate::reason::{Cause, Reason, Subject};
 use crate::rollout::RolloutEvaluator;
 
 /// The default executor. It abandons a plan only if the remaining plan fails even when executed
@@ -93,7 +93,10 @@ impl ExecutorServices {
     /// Sets the odds.
     #[must_use]
     pub fn with_comparator(self, odds: Option<Box<dyn PlanComparator>>) -> Self {
-        Self { comparator: odds, ..self }
+        Self {
+            comparator: odds,
+            ..self
+        }
     }
 }
 

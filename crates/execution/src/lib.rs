@@ -26,38 +26,46 @@
 //! # Ok::<(), elbowroom_execution::executors::UnknownExecutor>(())
 //! ```
 
+mod action_values;
+mod belief_state;
 mod dispatch;
+mod dispatchable_cache;
 mod event;
 mod executor;
 pub mod executors;
-mod dispatchable_cache;
-mod window_propagation;
+mod measured_amounts;
 mod plan_comparison;
-mod action_values;
 mod planning;
 mod preparation;
-mod belief_state;
-mod measured_amounts;
 mod reason;
 mod record;
-mod rollout;
 mod request;
+mod rollout;
 pub mod run;
 mod separation;
+mod window_propagation;
 mod world;
 
-pub use event::{Command, Ending, Event, GoalTerms, Measured, Observation, Request, ActionHandle};
-pub use executor::{
-    Decided, Decision, Executor, PreparedPlan, DecisionContext, PlanForm, PlanEvent, Order, Planned, StepId,
+pub use action_values::{ActionValues, DecisionState, Move, RankedMoves};
+pub use belief_state::{
+    BeliefState, BeliefStateParts, Doubt, EvaluationError, Guards, RunningActionParts,
+    RunningActionState,
 };
 pub use dispatchable_cache::DispatchableCache;
-pub use plan_comparison::{SuccessRates, PlanComparator, RemainingPlan};
-pub use action_values::{Move, ActionValues, DecisionState, RankedMoves};
+pub use event::{ActionHandle, Command, Ending, Event, GoalTerms, Measured, Observation, Request};
+pub use executor::{
+    Decided, Decision, DecisionContext, Executor, Order, PlanEvent, PlanForm, Planned,
+    PreparedPlan, StepId,
+};
+pub use plan_comparison::{PlanComparator, RemainingPlan, SuccessRates};
 pub use planning::{Lateness, NoPlanner, PlanAnswer, Planned as PlannerAnswer, Planner, Shortfall};
-pub use preparation::{PrepareError, PreparationResult, Preparer, RegionOracle, PreparationRequest};
-pub use belief_state::{Doubt, Guards, BeliefStateParts, BeliefState, RunningActionState, RunningActionParts, EvaluationError};
-pub use reason::{Subject, Evidence, Cause, TimedChange, GuaranteeLevel, Reason};
+pub use preparation::{
+    PreparationRequest, PreparationResult, PrepareError, Preparer, RegionOracle,
+};
+pub use reason::{Cause, Evidence, GuaranteeLevel, Reason, Subject, TimedChange};
 pub use record::{Entry, GoalChange, NoRecord, Recorder, WarningCause};
-pub use rollout::{RolloutEvaluator, RolloutResult, RolloutChoice, DecisionPoint, ObservedChange, Informativeness};
 pub use request::{Answer, PlanRequest, PortWorkers, PrepareRequest, RequestId, Urgency, Workers};
+pub use rollout::{
+    DecisionPoint, Informativeness, ObservedChange, RolloutChoice, RolloutEvaluator, RolloutResult,
+};
 pub use world::{TimeAdvance, World, WorldError};

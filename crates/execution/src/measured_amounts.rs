@@ -101,7 +101,11 @@ pub(crate) fn duration_parameters(
 }
 
 /// Returns the expression for the nominal amount of an effect, in the domain or the plan.
-pub(crate) fn amount_expression(action: &Action, is_end: bool, fluent: FluentId) -> Option<&Expression> {
+pub(crate) fn amount_expression(
+    action: &Action,
+    is_end: bool,
+    fluent: FluentId,
+) -> Option<&Expression> {
     let effects: &[Effect] = match (&action.body, is_end) {
         (Body::Instantaneous(snap), _) => &snap.effects,
         (Body::Durative(body), false) => &body.start.effects,

@@ -2,8 +2,8 @@
 
 use elbowroom_num::Rational;
 
-use crate::executor::PreparedPlan;
 use crate::belief_state::BeliefState;
+use crate::executor::PreparedPlan;
 
 /// Estimates the success probabilities of plans.
 pub trait PlanComparator: Send {

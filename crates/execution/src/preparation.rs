@@ -15,9 +15,9 @@ use elbowroom_plan::{
     Valuation,
 };
 
-use crate::event::ActionHandle;
-use crate::executor::{PreparedPlan, PlanForm, StepId};
 use crate::dispatchable_cache::DispatchableCache;
+use crate::event::ActionHandle;
+use crate::executor::{PlanForm, PreparedPlan, StepId};
 
 /// A plan prepared for execution.
 #[derive(Clone, Debug)]
@@ -114,7 +114,10 @@ impl PreparationRequest<'_> {
     ///
     /// # Errors
     /// If the plan does not work.
-    pub fn prepare_now<P: Preparer + ?Sized>(&self, preparer: &mut P) -> Result<PreparedPlan, PrepareError> {
+    pub fn prepare_now<P: Preparer + ?Sized>(
+        &self,
+        preparer: &mut P,
+    ) -> Result<PreparedPlan, PrepareError> {
         let task = Arc::new(self.situation.remaining_task(self.task));
         // The running actions come first in it.
         let plan = self.situation.remaining_plan(self.plan);

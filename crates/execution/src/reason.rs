@@ -1,14 +1,14 @@
 //! Reasons for the decisions of executors.
 
-mod subject;
 mod evidence;
+mod subject;
 
 use std::fmt;
 
 use elbowroom_num::{Interval, Rational};
 
-pub use subject::Subject;
 pub use evidence::{Evidence, TimedChange};
+pub use subject::Subject;
 
 /// The reason for a decision of an executor: the observation, the allowed values, the constraints
 /// and events that caused it, the amount of the violation, and the time since when it holds. Times
@@ -289,7 +289,7 @@ fn format_interval(interval: &Interval) -> String {
 mod tests {
     use elbowroom_num::{Interval, Rational};
 
-    use super::{Subject, Cause, Reason};
+    use super::{Cause, Reason, Subject};
 
     fn missed_by(about: Subject, by: Rational) -> String {
         let reason = Reason {

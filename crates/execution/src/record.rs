@@ -3,8 +3,8 @@
 use elbowroom_model::{Situation, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
-use crate::event::{Command, Observation, ActionHandle};
-use crate::executor::{Decided, PreparedPlan, Planned};
+use crate::event::{ActionHandle, Command, Observation};
+use crate::executor::{Decided, Planned, PreparedPlan};
 use crate::planning::Shortfall;
 use crate::reason::Reason;
 use crate::run::{Report, RunSnapshot, Verdict};

@@ -5,10 +5,10 @@ use std::sync::Arc;
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
-use crate::event::{Event, ActionHandle};
-use crate::executor::{PreparedPlan, PlanForm};
+use crate::event::{ActionHandle, Event};
+use crate::executor::{PlanForm, PreparedPlan};
 use crate::planning::{Planned, Planner};
-use crate::preparation::{PrepareError, Preparer, PreparationRequest};
+use crate::preparation::{PreparationRequest, PrepareError, Preparer};
 use crate::world::{TimeAdvance, World, WorldError};
 
 /// Identifies a request within its run. Later requests have greater identifiers.
@@ -234,7 +234,9 @@ impl Workers for PortWorkers<'_> {
                 None
             }
             Urgency::Background => Some(self.preparer.collect(&wanted)),
-            Urgency::Awaited | Urgency::Anticipated => Some(wanted.prepare_now(&mut *self.preparer)),
+            Urgency::Awaited | Urgency::Anticipated => {
+                Some(wanted.prepare_now(&mut *self.preparer))
+            }
         }
     }
 

@@ -6,9 +6,9 @@ use elbowroom_model::ground::FactId;
 use elbowroom_model::{Step, Task};
 use elbowroom_num::Rational;
 
-use crate::event::ActionHandle;
-use crate::executor::{Executor, PreparedPlan, PlanEvent, StepId};
 use crate::belief_state::BeliefState;
+use crate::event::ActionHandle;
+use crate::executor::{Executor, PlanEvent, PreparedPlan, StepId};
 
 /// Compares the possible choices by rollouts: continuing the plan, handing it over to another
 /// executor, making another plan, and waiting. The value of a choice is the share of samples in

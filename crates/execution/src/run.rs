@@ -75,38 +75,38 @@
 //! initial that affects the goal has happened, and the world has had the chance to look
 //! ([`World::look`]).
 
-mod action_log;
-mod work_queue;
-mod mid_execution;
-mod plan_start;
-mod better_plan;
 mod abandoned_plan;
-mod goal_selection;
+mod action_log;
+mod anticipated_replan;
+mod background_search;
+mod better_plan;
+mod clock_watchdog;
 mod dead_end;
 mod doubts;
-mod step;
-mod prediction;
-mod shutdown;
-mod anticipated_replan;
+mod goal_selection;
 mod goals;
-mod replanning;
-pub mod situation;
-mod observations;
-mod kept_goals;
-mod persistent;
 mod history_pruning;
+mod kept_goals;
+mod mid_execution;
+mod observations;
 mod pending;
-mod clock_watchdog;
+mod persistent;
+mod plan_start;
+mod prediction;
 mod queued_goals;
 mod refusal_backoff;
-mod slack_monitor;
-mod background_search;
+mod replanning;
 mod selection;
 mod settings;
 mod shortfall;
+mod shutdown;
+pub mod situation;
+mod slack_monitor;
 mod snapshot;
-mod timeout;
 mod start_dependencies;
+mod step;
+mod timeout;
+mod work_queue;
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -115,34 +115,34 @@ use elbowroom_model::{Footprint, Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::{Rational, work};
 
 pub use action_log::{ActionLog, ExecutedStep, KnownStart};
-pub use mid_execution::{MidExecutionStart, EntryPoint};
-pub use step::{Next, UnexpectedAnswer};
-pub use shutdown::SHUTDOWN_GRACE;
-pub use observations::is_correction;
 pub use kept_goals::Wait;
-pub use persistent::{PROBLEM_GOAL_NAME, GoalReader};
+pub use mid_execution::{EntryPoint, MidExecutionStart};
+pub use observations::is_correction;
+pub use persistent::{GoalReader, PROBLEM_GOAL_NAME};
 pub use refusal_backoff::RefusalBackoff;
 pub use settings::{
     MissingPlan, PlanningTime, Report, RunSettings, RunningRule, UnknownSetting, Verdict,
 };
-pub use snapshot::{RunPhase, GivenGoal, Goals, RunSnapshot, PlanAdoption};
+pub use shutdown::SHUTDOWN_GRACE;
+pub use snapshot::{GivenGoal, Goals, PlanAdoption, RunPhase, RunSnapshot};
+pub use step::{Next, UnexpectedAnswer};
 pub use timeout::TimeoutRule;
 
-use crate::event::{Command, ActionHandle};
-use crate::executor::{Decided, Decision, Executor, DecisionContext, PlanEvent, Order, Planned};
-use crate::belief_state::{GoalStatus, BeliefState};
-use crate::reason::{Subject, Cause, Reason};
+use crate::belief_state::{BeliefState, GoalStatus};
+use crate::event::{ActionHandle, Command};
+use crate::executor::{Decided, Decision, DecisionContext, Executor, Order, PlanEvent, Planned};
+use crate::reason::{Cause, Reason, Subject};
 use crate::record::{Entry, Recorder};
 use crate::request::Workers;
 use crate::world::{World, WorldError};
-use work_queue::PendingStep;
-use dead_end::BelievedEvent;
-use shutdown::Shutdown;
 use anticipated_replan::AnticipatedReplan;
-use persistent::GoalManager;
-use pending::AwaitedAnswer;
+use background_search::{BackgroundSearch, SearchResults};
 use clock_watchdog::ClockWatchdog;
-use background_search::{SearchResults, BackgroundSearch};
+use dead_end::BelievedEvent;
+use pending::AwaitedAnswer;
+use persistent::GoalManager;
+use shutdown::Shutdown;
+use work_queue::PendingStep;
 
 /// Work units ([`elbowroom_num::work`]) of a decision, and of each step of the plan in it.
 const DECISION_WORK: u64 = 10_000;
@@ -509,7 +509,8 @@ impl<'a> Run<'a> {
                 self.reasons.pop();
                 self.work_queue.push(PendingStep::Replan(reason.clone()));
                 let doubts = self.belief.doubt_count();
-                self.work_queue.push(PendingStep::WaitForActions(overdue, doubts));
+                self.work_queue
+                    .push(PendingStep::WaitForActions(overdue, doubts));
                 return Ok(());
             }
         }
@@ -519,7 +520,8 @@ impl<'a> Run<'a> {
             // The last permitted plan is not requested while overdue actions are running.
             let overdue = self.longer_than_planned();
             let doubts = self.belief.doubt_count();
-            self.work_queue.push(PendingStep::WaitForActions(overdue, doubts));
+            self.work_queue
+                .push(PendingStep::WaitForActions(overdue, doubts));
         }
         self.settle_running_actions();
         Ok(())

@@ -77,7 +77,12 @@ impl Separation {
     }
 
     /// Records that a running action is expected to end at `end`.
-    pub(crate) fn expect_end(&mut self, number: u32, (task, action): (&Task, &Action), end: Rational) {
+    pub(crate) fn expect_end(
+        &mut self,
+        number: u32,
+        (task, action): (&Task, &Action),
+        end: Rational,
+    ) {
         let expected = Expected {
             time: end,
             successful: Footprint::of_end(task, action),
@@ -118,7 +123,9 @@ impl Separation {
         let recent = self.recent.iter();
         let recent = recent.filter(|(change, _)| change.interferes_with(&start));
         let recent = recent.map(|(_, separated)| separated.clone());
-        let soon = self.separated_times_near(&start, now).filter(|time| time > now);
+        let soon = self
+            .separated_times_near(&start, now)
+            .filter(|time| time > now);
         let ends = duration.into_iter().flat_map(|duration| {
             let end = self.possible_end(task, action);
             let times: Vec<Rational> = self.separated_times_near(&end, &(now + duration)).collect();

@@ -60,7 +60,10 @@ impl WindowPropagation {
     pub(crate) fn one_hop(network: Network) -> Self {
         let mut happened = vec![None; network.node_count()];
         happened[0] = Some(Rational::ZERO);
-        Self::OneHop(OneHop { network, executed: happened })
+        Self::OneHop(OneHop {
+            network,
+            executed: happened,
+        })
     }
 
     /// Creates the horizon of a network in dispatchable form.
@@ -210,7 +213,11 @@ impl WindowPropagation {
 }
 
 /// Returns the causes of one end of a node's window, or of its link if that is tighter.
-fn link_or_window_causes(dispatcher: &Dispatcher, node: NodeId, end: WindowEnd) -> Vec<NetworkLimit> {
+fn link_or_window_causes(
+    dispatcher: &Dispatcher,
+    node: NodeId,
+    end: WindowEnd,
+) -> Vec<NetworkLimit> {
     let (earliest, latest) = dispatcher.window(node);
     let (least, most) = dispatcher.bounds(node);
     let is_link = match end {
@@ -239,7 +246,10 @@ pub(crate) fn constraints_of_steps(steps: &[Step]) -> Vec<NetworkLimit> {
 
 impl OneHop {
     fn window(&self, node: NodeId) -> TimeWindow {
-        let time = |end| self.tightest_constraint(node, end).and_then(|id| self.limit(id, end));
+        let time = |end| {
+            self.tightest_constraint(node, end)
+                .and_then(|id| self.limit(id, end))
+        };
         (time(WindowEnd::Earliest), time(WindowEnd::Latest))
     }
 

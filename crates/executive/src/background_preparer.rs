@@ -3,9 +3,11 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use elbowroom::execute::{PlanPreparer, RunSpec, SpecError, ExactRegion};
+use elbowroom::execute::{ExactRegion, PlanPreparer, RunSpec, SpecError};
 use elbowroom::execution::executors::ExecutorSpec;
-use elbowroom::execution::{PreparedPlan, PlanForm, PrepareError, PreparationResult, Preparer, PreparationRequest};
+use elbowroom::execution::{
+    PlanForm, PreparationRequest, PreparationResult, PrepareError, PreparedPlan, Preparer,
+};
 use elbowroom::model::{Task, TimeTriggeredPlan};
 
 use crate::background_task::BackgroundTask;

@@ -1,6 +1,6 @@
 //! World in the process of its executive.
 
-use elbowroom::execution::{TimeAdvance, ActionHandle, World, WorldError};
+use elbowroom::execution::{ActionHandle, TimeAdvance, World, WorldError};
 use elbowroom::num::Rational;
 
 /// World that is an object in the process of its executive, instead of a simulation or a process of

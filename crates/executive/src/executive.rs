@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use elbowroom::answers::{StopRequest, Observer};
+use elbowroom::answers::{Observer, StopRequest};
 use elbowroom::execute::RunSpec;
 use elbowroom::execution::run::PlanningTime;
 use elbowroom::executive::Status;
@@ -142,7 +142,11 @@ impl Executive {
     pub fn resume(journal: &Path, mut settings: ExecutiveSettings) -> Result<Self, RunError> {
         settings.journal = Some(journal.to_owned());
         let cannot = |error: &std::io::Error| {
-            let message = format!("cannot read {}: {}", journal.display(), io_error_message(error));
+            let message = format!(
+                "cannot read {}: {}",
+                journal.display(),
+                io_error_message(error)
+            );
             Error::new(message, "check the path of the journal")
         };
         let text = fs::read_to_string(journal).map_err(|error| cannot(&error))?;
@@ -399,7 +403,9 @@ pub fn make_persistent(spec: &mut RunSpec) {
 }
 
 /// Returns the world with a shorter lifetime.
-fn with_shorter_lifetime<'a>(world: &'a mut (dyn EmbeddedWorld + '_)) -> &'a mut (dyn EmbeddedWorld + 'a) {
+fn with_shorter_lifetime<'a>(
+    world: &'a mut (dyn EmbeddedWorld + '_),
+) -> &'a mut (dyn EmbeddedWorld + 'a) {
     world
 }
 

@@ -244,7 +244,10 @@ fn cannot_write(path: &Path, error: &io::Error) -> Error {
 pub fn is_journal(text: &str) -> bool {
     let head = text.as_bytes().get(..CHECKSUM_PREFIX_LENGTH + 1);
     head.is_some_and(|head| {
-        head[..CHECKSUM_PREFIX_LENGTH - 1].iter().all(u8::is_ascii_hexdigit) && &head[CHECKSUM_PREFIX_LENGTH - 1..] == b" {"
+        head[..CHECKSUM_PREFIX_LENGTH - 1]
+            .iter()
+            .all(u8::is_ascii_hexdigit)
+            && &head[CHECKSUM_PREFIX_LENGTH - 1..] == b" {"
     })
 }
 

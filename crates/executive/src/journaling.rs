@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use elbowroom::execution::run::RunSnapshot;
 use elbowroom::execution::{
-    Command, Ending, Entry, Event, Observation, TimeAdvance, Recorder, World, WorldError,
+    Command, Ending, Entry, Event, Observation, Recorder, TimeAdvance, World, WorldError,
 };
 use elbowroom::executive::Status;
 use elbowroom::model::Task;

@@ -12,7 +12,7 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use elbowroom::answers::NoObserver;
-use elbowroom::answers::learn::{LearntAction, LearnRequest, Log, Settings, learn};
+use elbowroom::answers::learn::{LearnRequest, LearntAction, Log, Settings, learn};
 use elbowroom::execution::Entry;
 use elbowroom::text::Source;
 
@@ -218,7 +218,10 @@ fn read_log(path: &Path) -> Result<StoredLog, String> {
     };
     let source = Source::new(path.display().to_string(), text);
     let log = Log::read(&source).map_err(|error| error.to_string())?;
-    let domain = log.fact_history.as_ref().map(|course| course.domain().to_owned());
+    let domain = log
+        .fact_history
+        .as_ref()
+        .map(|course| course.domain().to_owned());
     Ok(StoredLog { log, domain, copy })
 }
 
@@ -288,6 +291,10 @@ fn updates(mut learner: Learner, ended: &Receiver<()>) {
 
 fn update(learner: &mut Learner) {
     if let Err(error) = learner.update() {
-        learner.warn(&format!("{}: {}", learner.folder.display(), io_error_message(&error)));
+        learner.warn(&format!(
+            "{}: {}",
+            learner.folder.display(),
+            io_error_message(&error)
+        ));
     }
 }

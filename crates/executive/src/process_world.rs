@@ -17,8 +17,8 @@ use crate::clock::Clock;
 use crate::error::Error;
 use crate::messages::excerpt;
 use crate::world_protocol::{
-    Capability, MAX_ANSWER, MAX_LINE, LineReader, LineWriter, Message, MessageParser,
-    ReadResult, WriteResult, find_program, hello, is_time, launch, wait_for_exit,
+    Capability, LineReader, LineWriter, MAX_ANSWER, MAX_LINE, Message, MessageParser, ReadResult,
+    WriteResult, find_program, hello, is_time, launch, wait_for_exit,
 };
 
 /// Time limit for a program to exit after the run.
@@ -233,7 +233,9 @@ impl ProcessWorld {
                 ReadResult::Line(line) => line,
                 ReadResult::LineTooLong => return Err(endless_line()),
                 ReadResult::AnswerTooLong => return Err(too_long(invalid.as_deref())),
-                ReadResult::Timeout if self.since_stop_request.is_none() && self.stop.is_requested() => {
+                ReadResult::Timeout
+                    if self.since_stop_request.is_none() && self.stop.is_requested() =>
+                {
                     self.since_stop_request = Some(Clock::start());
                     let now = self.now.clone();
                     return Ok(TimeAdvance { now, observations });

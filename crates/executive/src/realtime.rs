@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use elbowroom::execution::run::PlanningTime;
 use elbowroom::execution::{
-    Command, Observation, TimeAdvance, Planner, PlannerAnswer, World, WorldError,
+    Command, Observation, Planner, PlannerAnswer, TimeAdvance, World, WorldError,
 };
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::model::{Situation, Task};

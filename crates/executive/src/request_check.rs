@@ -1,7 +1,7 @@
 //! Checks of operators' requests against the problem of a run, before the run receives them.
 
 use elbowroom::execute::{ill_typed_part, obstacle_to_deadline, read_goal};
-use elbowroom::execution::{GoalTerms, Request, ActionHandle};
+use elbowroom::execution::{ActionHandle, GoalTerms, Request};
 use elbowroom::executive::Status;
 use elbowroom::model::Task;
 use elbowroom::num::Rational;

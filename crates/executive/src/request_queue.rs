@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use elbowroom::execution::{Ending, Event, GoalTerms, Observation, Request, ActionHandle};
+use elbowroom::execution::{ActionHandle, Ending, Event, GoalTerms, Observation, Request};
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
 
@@ -121,7 +121,9 @@ impl RequestQueue {
     /// Waits until the run has accepted request `number` or can no longer accept it, for at most `timeout`.
     pub fn wait_until_accepted(&self, number: u64, timeout: Duration) -> RequestStatus {
         let state = self.lock();
-        let waits = |state: &mut State| state.accepted < number && !state.has_journal_failed && !state.has_run_ended;
+        let waits = |state: &mut State| {
+            state.accepted < number && !state.has_journal_failed && !state.has_run_ended
+        };
         let waited = self.0.changed.wait_timeout_while(state, timeout, waits);
         let (state, _) = waited.unwrap_or_else(PoisonError::into_inner);
         match () {

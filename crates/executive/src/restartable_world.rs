@@ -6,7 +6,7 @@
 use std::time::Duration;
 
 use elbowroom::execution::{
-    Command, Ending, Event, Observation, TimeAdvance, ActionHandle, World, WorldError,
+    ActionHandle, Command, Ending, Event, Observation, TimeAdvance, World, WorldError,
 };
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;

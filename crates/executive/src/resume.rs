@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use elbowroom::answers::run::run as execute;
-use elbowroom::answers::{RunRequest, Observer};
+use elbowroom::answers::{Observer, RunRequest};
 use elbowroom::execute::RunSpec;
 use elbowroom::execute::SpecError;
 use elbowroom::execution::run::Verdict;
@@ -91,8 +91,8 @@ impl InterruptedRun {
                 "`elbowroom run --journal` writes them; a trace can be played back with --replay",
             ));
         }
-        let mut journal =
-            Journal::read(text).map_err(|why| unreadable_journal_error(&name, &why, DAMAGE_ADVICE))?;
+        let mut journal = Journal::read(text)
+            .map_err(|why| unreadable_journal_error(&name, &why, DAMAGE_ADVICE))?;
         if journal.text.is_empty() {
             let is_cut_off = !text.contains('\n');
             let (why, advice) = if is_cut_off {
@@ -106,7 +106,8 @@ impl InterruptedRun {
         }
         let read = |journal: &Journal| {
             let stored = Stored::read(&journal.text);
-            stored.map_err(|error| unreadable_journal_error(&name, &error.to_string(), OTHER_VERSION))
+            stored
+                .map_err(|error| unreadable_journal_error(&name, &error.to_string(), OTHER_VERSION))
         };
         let mut stored = read(&journal)?;
         if let Some(end) = end_by_world(&stored.lines) {
@@ -129,7 +130,11 @@ impl InterruptedRun {
         let spec: RunSpec =
             spec.map_err(|error| Error::new(format!("{name}, {error}"), OTHER_VERSION))?;
         if spec.world_process.is_none() {
-            return Err(unreadable_journal_error(&name, "its world was no process", OTHER_VERSION));
+            return Err(unreadable_journal_error(
+                &name,
+                "its world was no process",
+                OTHER_VERSION,
+            ));
         }
         Ok(JournaledRun::Interrupted(Box::new(Self {
             path: path.to_owned(),
@@ -207,10 +212,15 @@ impl InterruptedRun {
         } = settings;
         let name = path.display().to_string();
         let source = WorldSource::of(&spec, embedded)?;
-        let wrong = |error: &dyn fmt::Display| unreadable_journal_error(&name, &error.to_string(), OTHER_VERSION);
+        let wrong = |error: &dyn fmt::Display| {
+            unreadable_journal_error(&name, &error.to_string(), OTHER_VERSION)
+        };
         // Before any other fact is mentioned: the table of facts has to be as it was.
         let snapshot = stored.snapshot().map_err(|error| wrong(&error))?;
-        let stand = snapshot.as_ref().map(|it| it.to_run_snapshot(task)).transpose();
+        let stand = snapshot
+            .as_ref()
+            .map(|it| it.to_run_snapshot(task))
+            .transpose();
         let stand = stand.map_err(|why| wrong(&format!("line 2: {why}")))?;
         let now = snapshot.as_ref().map(|it| it.now().clone());
         let first = spec.has_plan.then(|| stored.first_plan(task));

@@ -6,10 +6,10 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use elbowroom::answers::run::{RunOutcome, run as execute};
-use elbowroom::answers::{Event, StopRequest, RunRequest, Observer};
+use elbowroom::answers::{Event, Observer, RunRequest, StopRequest};
 use elbowroom::execute::{RunSpec, SpecError};
 use elbowroom::execution::run::RunSnapshot;
-use elbowroom::execution::{Entry, Planner, BeliefState, Recorder, World};
+use elbowroom::execution::{BeliefState, Entry, Planner, Recorder, World};
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 use elbowroom::report::trace::{Line, TraceWriter};

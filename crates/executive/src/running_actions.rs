@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use elbowroom::execution::{Command, Event, ActionHandle};
+use elbowroom::execution::{ActionHandle, Command, Event};
 use elbowroom::num::Rational;
 use elbowroom::report::trace::schema::{IssuedCommandLine, ObservationLine};
 use elbowroom::report::trace::{Line, SnapshotLine, Stored};

@@ -265,7 +265,10 @@ impl TraceBuffer {
     }
 
     /// Counts a client while it reads a stream.
-    pub(crate) fn with_listener_count(&self, stream: impl FnOnce() -> io::Result<()>) -> io::Result<()> {
+    pub(crate) fn with_listener_count(
+        &self,
+        stream: impl FnOnce() -> io::Result<()>,
+    ) -> io::Result<()> {
         self.lock().listeners += 1;
         let streamed = stream();
         self.lock().listeners -= 1;

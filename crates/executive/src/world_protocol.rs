@@ -7,7 +7,7 @@ mod pipe_io;
 
 pub use belief_message::belief_message;
 pub use message_parser::{Capability, Greeting, Message, MessageParser, hello, is_time};
-pub use pipe_io::{MAX_ANSWER, MAX_LINE, LineReader, LineWriter, ReadResult, WriteResult};
+pub use pipe_io::{LineReader, LineWriter, MAX_ANSWER, MAX_LINE, ReadResult, WriteResult};
 
 use std::io;
 use std::path::Path;

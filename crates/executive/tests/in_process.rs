@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use elbowroom::execute::{NamedText, RunSpec};
 use elbowroom::execution::{
-    Command as WorldCommand, Ending, Event, GoalTerms, Observation, TimeAdvance, Request, ActionHandle,
-    World, WorldError,
+    ActionHandle, Command as WorldCommand, Ending, Event, GoalTerms, Observation, Request,
+    TimeAdvance, World, WorldError,
 };
 use elbowroom::executive::documents::{Activity, GoalNow, NewGoal};
 use elbowroom::model::ground::{FactId, FluentId};

@@ -98,6 +98,9 @@ mod tests {
 
     #[test]
     fn empty_queue_times_out() {
-        assert_eq!(PlanQueue::default().pop_timeout(Duration::ZERO), Received::TimedOut);
+        assert_eq!(
+            PlanQueue::default().pop_timeout(Duration::ZERO),
+            Received::TimedOut
+        );
     }
 }

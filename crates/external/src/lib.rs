@@ -43,12 +43,12 @@
     )
 )]
 
+mod channel;
 mod clock;
 mod command;
-mod plan_check;
-mod output_parser;
-mod channel;
 mod outcome;
+mod output_parser;
+mod plan_check;
 #[cfg(target_os = "linux")]
 mod processes;
 mod reader;
@@ -61,8 +61,8 @@ mod supervise;
 mod workspace;
 
 pub use command::{Command, CommandError};
-pub use plan_check::Repair;
 pub use outcome::{Event, Found, Outcome, Report, Statistics};
+pub use plan_check::Repair;
 pub use registry::{ExitPhrases, Kind, Planner, PlannerError, REGISTRY, Registered};
 pub use request::{Question, Request};
 pub use run::plan;

@@ -36,7 +36,9 @@ impl PlanValidator<'_, '_> {
             Ok((plan, _)) => self.validate_plan(&plan),
             Err(errors) => {
                 let first = errors.errors().next().map(ToString::to_string);
-                ValidationResult::Unreadable(first.unwrap_or_else(|| "it cannot be read".to_owned()))
+                ValidationResult::Unreadable(
+                    first.unwrap_or_else(|| "it cannot be read".to_owned()),
+                )
             }
         }
     }

@@ -2,8 +2,8 @@
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use super::output_parser::{OutputParser, FoundPhrases};
 use super::channel::PlanQueue;
+use super::output_parser::{FoundPhrases, OutputParser};
 use super::registry::Planner;
 use super::supervise::{Ending, Stream, Watcher};
 use super::workspace::Workspace;

@@ -7,11 +7,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use super::clock::Clock;
-use super::plan_check::{PlanValidator, ValidationResult, Repair};
-use super::output_parser::FoundPhrases;
 use super::channel::Received;
+use super::clock::Clock;
 use super::outcome::{Event, Found, Outcome, Report, Statistics};
+use super::output_parser::FoundPhrases;
+use super::plan_check::{PlanValidator, Repair, ValidationResult};
 use super::reader::{Reader, Shared};
 use super::registry::Planner;
 use super::request::Request;

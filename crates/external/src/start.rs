@@ -41,7 +41,10 @@ pub(super) fn prepare(
         } else {
             "there is no program"
         };
-        not_started(format!("{what} {}", program.display()), &planner.install_hint)
+        not_started(
+            format!("{what} {}", program.display()),
+            &planner.install_hint,
+        )
     })?;
     let domain = request.domain.text();
     let scratch = settings.scratch.as_deref();

@@ -96,7 +96,13 @@ impl Workspace {
                 ready.push((look.modified, path.clone()));
             }
             let is_read = is_settled || is_old;
-            self.files.insert(path, PlanFile { stamp: look, is_read });
+            self.files.insert(
+                path,
+                PlanFile {
+                    stamp: look,
+                    is_read,
+                },
+            );
         }
         ready.sort();
         let texts = ready.iter().filter_map(|(_, path)| text_of(path).ok());

@@ -16,10 +16,10 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use elbowroom::execute::{
-    Embedded, Execution, RolloutPolicy, Replanning, Rollouts, SharedRolloutPolicy, ExactRegion,
+    Embedded, ExactRegion, Execution, Replanning, RolloutPolicy, Rollouts, SharedRolloutPolicy,
 };
 use elbowroom::pipeline;
-use elbowroom_execution::executors::{ExecutorSpec, PolicyTableCache, ExecutorServices};
+use elbowroom_execution::executors::{ExecutorServices, ExecutorSpec, PolicyTableCache};
 use elbowroom_execution::run::{RunSettings, Verdict};
 use elbowroom_execution::{ActionValues, PlanAnswer, Planner};
 use elbowroom_laboratory::timed::{Policy, Settings};

@@ -17,8 +17,8 @@ mod timed;
 use std::path::Path;
 use std::sync::Arc;
 
-use elbowroom::execute::{Execution, ExactRegion};
-use elbowroom_execution::executors::{ExecutorSpec, ExecutorServices};
+use elbowroom::execute::{ExactRegion, Execution};
+use elbowroom_execution::executors::{ExecutorServices, ExecutorSpec};
 use elbowroom_model::Task;
 use elbowroom_pddl::{Source, read_plan, read_problem};
 use elbowroom_sim::{SimWorld, WorldModel};

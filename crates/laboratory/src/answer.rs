@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::sync::{Mutex, PoisonError};
 
-use elbowroom::answers::{Event, TrialsProgress, Observer};
+use elbowroom::answers::{Event, Observer, TrialsProgress};
 use elbowroom_report::plot::IntervalPlot;
 use elbowroom_report::table::Table;
 use elbowroom_text::{Diagnostics, Source};
@@ -234,7 +234,8 @@ impl CompareAnswer {
             Self::Untimed(_) => None,
         });
         if let Some(timed) = timed.collect::<Option<Vec<Results>>>() {
-            let merged = Results::merge_results(&timed).map_err(|error| CompareError::other(&error))?;
+            let merged =
+                Results::merge_results(&timed).map_err(|error| CompareError::other(&error))?;
             return Ok(Self::Timed(merged));
         }
         let untimed = parts.iter().map(|part| match part {
@@ -255,7 +256,13 @@ impl CompareAnswer {
             for (kind, failure) in kinds.enumerate() {
                 let place = (row, column, kind);
                 let id = failure.first;
-                found.push((std::cmp::Reverse(failure.runs), FailedTrial { position: place, id }));
+                found.push((
+                    std::cmp::Reverse(failure.runs),
+                    FailedTrial {
+                        position: place,
+                        id,
+                    },
+                ));
             }
         };
         match self {
@@ -298,7 +305,10 @@ impl CompareAnswer {
             for (column, cell) in cells.iter().enumerate() {
                 let place = (row, column, cell.failures.kinds().len());
                 let first = cell.invalid.first.as_ref();
-                found.extend(first.map(|(id, _)| FailedTrial { position: place, id: *id }));
+                found.extend(first.map(|(id, _)| FailedTrial {
+                    position: place,
+                    id: *id,
+                }));
             }
         }
         found

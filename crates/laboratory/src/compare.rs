@@ -6,15 +6,15 @@
 //! not random. Trials run in parallel. The results do not depend on the number of threads, and the
 //! results of parts (shards) add up to those of the whole.
 
-mod initial_plans;
 mod clairvoyant;
 mod experiment;
 mod failures;
+mod initial_plans;
 mod optimum;
 pub(crate) mod parts;
-mod scenario;
 mod plots;
 mod results;
+mod scenario;
 mod trials;
 
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -22,11 +22,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use elbowroom_num::work;
 use rayon::prelude::*;
 
-pub use initial_plans::FirstPlanNote;
-pub use experiment::{Column, Experiment, ExperimentError, Planning, Published, LinkedParameters};
+pub use experiment::{Column, Experiment, ExperimentError, LinkedParameters, Planning, Published};
 pub use failures::{Failure, Failures, TrialId};
+pub use initial_plans::FirstPlanNote;
 pub use optimum::ColumnOptimum;
-pub use results::{Cell, Invalid, DiscordantTrials, Results, ResultsError};
+pub use results::{Cell, DiscordantTrials, Invalid, Results, ResultsError};
 
 use parts::Partial;
 use trials::Setting;
@@ -181,7 +181,11 @@ mod tests {
     #[test]
     fn threads_are_assigned_to_trials_first() {
         for (threads, pieces, each) in [(1, 1, 1), (2, 1, 2), (2, 100, 1), (7, 2, 3), (4, 0, 4)] {
-            assert_eq!(threads_per_piece(threads, pieces), each, "{threads}, {pieces}");
+            assert_eq!(
+                threads_per_piece(threads, pieces),
+                each,
+                "{threads}, {pieces}"
+            );
         }
     }
 }

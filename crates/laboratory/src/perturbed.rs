@@ -5,10 +5,10 @@
 //! of a trial depend only on the experiment's seed, the case and the trial's number, so results do
 //! not depend on the number of threads.
 
-mod stored_trial;
 mod experiment;
 mod planner;
 mod results;
+mod stored_trial;
 mod table;
 
 use std::collections::BTreeMap;
@@ -17,8 +17,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use crate::untimed::{
-    ActionName, StepRecord, ExecutorName, LookaheadPolicy, TrialSetup, Limits, ExecutorServices, NotTabulated, Plans,
-    Shortest, Trial, UntimedExecutor, UntimedWorld, all_actions_under, trial,
+    ActionName, ExecutorName, ExecutorServices, Limits, LookaheadPolicy, NotTabulated, Plans,
+    Shortest, StepRecord, Trial, TrialSetup, UntimedExecutor, UntimedWorld, all_actions_under,
+    trial,
 };
 use crate::worlds::{EventProbabilities, PerturbedFacts, PublishedWorld, SoundWorld};
 use elbowroom_model::ground::Action;
@@ -29,11 +30,11 @@ use elbowroom_probability::Likelihoods;
 use elbowroom_probability::optimum::{self, DeadEnds};
 use rayon::prelude::*;
 
-pub use stored_trial::{StoredTrial, StoredPlan, StoredStep};
 pub use experiment::{
     Case, OptimumRules, PerturbedError, PerturbedExperiment, PlannerKind, Published, WorldKind,
 };
 pub use results::{PerturbedResults, Row, Work};
+pub use stored_trial::{StoredPlan, StoredStep, StoredTrial};
 pub use table::{plots, records, table};
 
 use crate::compare::Part;
@@ -204,7 +205,8 @@ impl<'e> Setting<'e> {
             ));
         }
         let actions = all_actions_under(&task, &likelihoods).map_err(|error| wrong(&error))?;
-        let chances = EventProbabilities::new(&task, &actions, &likelihoods).map_err(|error| wrong(&error))?;
+        let chances = EventProbabilities::new(&task, &actions, &likelihoods)
+            .map_err(|error| wrong(&error))?;
         let perturbed = match &experiment.perturbation {
             Some(names) => Some(names.find(&task)?.facts(&task, &chances)),
             None => None,
@@ -277,7 +279,9 @@ impl<'e> Setting<'e> {
     }
 
     fn lookahead_policy(&self) -> Result<&LookaheadPolicy, PerturbedError> {
-        self.table().as_ref().map_err(|error| self.missing_table_error(error))
+        self.table()
+            .as_ref()
+            .map_err(|error| self.missing_table_error(error))
     }
 
     fn missing_table_error(&self, error: &NotTabulated) -> PerturbedError {

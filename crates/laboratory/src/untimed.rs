@@ -20,12 +20,12 @@
 //! [`Executor`](elbowroom_execution::Executor). They never wait.
 
 mod adaptable;
-mod step_record;
 mod esterel;
 mod lookahead;
 mod published;
 mod registry;
 mod shortest;
+mod step_record;
 
 use std::sync::Arc;
 
@@ -34,13 +34,13 @@ use elbowroom_model::problem::{ObjectId, SchemaId};
 use elbowroom_model::{State, Task, TimeTriggeredPlan};
 
 pub use adaptable::Adaptable;
-pub use step_record::{StepRecord, Entry, StepKind};
 pub use elbowroom_probability::{Unsupported, all_actions, all_actions_under};
 pub use esterel::Esterel;
 pub use lookahead::{LookaheadPolicy, NotTabulated};
 pub use published::PublishedExecutor;
-pub use registry::{EXECUTORS, ExecutorName, ExecutorServices, ExecutorEntry, UnknownExecutor};
+pub use registry::{EXECUTORS, ExecutorEntry, ExecutorName, ExecutorServices, UnknownExecutor};
 pub use shortest::Shortest;
+pub use step_record::{Entry, StepKind, StepRecord};
 
 /// World without time (a port).
 pub trait UntimedWorld {

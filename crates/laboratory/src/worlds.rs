@@ -6,10 +6,10 @@
 //! - [`PublishedWorld`]: the behaviour of the authors' programs that made the paper's results.
 
 mod event_probabilities;
+mod likelihood_world;
 mod published;
 mod rand_c;
-mod likelihood_world;
 
 pub use event_probabilities::EventProbabilities;
-pub use published::{Perturbation, PerturbedFacts, PublishedWorld};
 pub use likelihood_world::SoundWorld;
+pub use published::{Perturbation, PerturbedFacts, PublishedWorld};

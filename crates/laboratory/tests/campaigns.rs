@@ -43,7 +43,10 @@ fn results_are_independent_of_threads_and_parts() {
             ..WHOLE
         })
     });
-    assert_eq!(Results::merge_results(&parts).expect("a correct test"), whole);
+    assert_eq!(
+        Results::merge_results(&parts).expect("a correct test"),
+        whole
+    );
     assert!(Results::merge_results(&[parts[0].clone(), parts[0].clone()]).is_err());
     let text = whole.json().to_string();
     assert_eq!(Results::read(&text).expect("a correct test"), whole);

@@ -216,7 +216,9 @@ fn parts_add_up(experiment: &PerturbedExperiment, trials: u64) -> PerturbedResul
     assert_eq!(PerturbedResults::merge_results(&parts).unwrap(), whole);
     let twice = [parts[0].clone(), parts[0].clone()];
     assert!(PerturbedResults::merge_results(&twice).is_err());
-    assert!(PerturbedResults::merge_results(&[parts[0].clone(), run(part(trials - 1, 1))]).is_err());
+    assert!(
+        PerturbedResults::merge_results(&[parts[0].clone(), run(part(trials - 1, 1))]).is_err()
+    );
     whole
 }
 

@@ -56,7 +56,9 @@ const NEAR: [(&str, f64); 2] = [("weld", 0.957 - 0.15), ("vase", 0.976 - 0.13)];
 #[test]
 #[allow(clippy::cast_precision_loss, reason = "there are few trials")]
 fn policy_without_table_is_near_optimum() {
-    let trials = env_or_default("ELBOWROOM_TRIALS", "40").parse().expect("a number");
+    let trials = env_or_default("ELBOWROOM_TRIALS", "40")
+        .parse()
+        .expect("a number");
     for name in env_or_default("ELBOWROOM_WORLDS", "vase weld").split_whitespace() {
         let mut experiment = experiment(name);
         if let Ok(only) = std::env::var("ELBOWROOM_COLUMN") {

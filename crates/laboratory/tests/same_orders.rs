@@ -266,6 +266,11 @@ fn discarded_order_can_be_repeated_only_in_own_table_2() {
     for (ours, path) in ours.iter_mut().zip(&theirs) {
         let task = shared::task(&domain, path).expect("a readable problem");
         assert!(validated_end(ours, &translated(&again(six).text)).is_some());
-        assert_eq!(validated_end(&task, &again(six).text), None, "{}", path.display());
+        assert_eq!(
+            validated_end(&task, &again(six).text),
+            None,
+            "{}",
+            path.display()
+        );
     }
 }

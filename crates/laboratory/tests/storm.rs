@@ -23,7 +23,7 @@ use elbowroom_pddl::{Source, read_problem};
 use elbowroom_plan::PartialOrderPlan;
 use elbowroom_probability::optimum::{self as without_time, DeadEnds, Perturbed};
 use elbowroom_probability::{
-    SearchState, Likelihoods, Model, Semantics, all_actions_under, likelihoods,
+    Likelihoods, Model, SearchState, Semantics, all_actions_under, likelihoods,
 };
 use elbowroom_sim::WorldModel;
 use rand::SeedableRng;

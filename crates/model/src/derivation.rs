@@ -146,7 +146,8 @@ impl Derivation {
             match stratum {
                 [fact] if !sorted.strata.is_recursive(*fact) => {
                     let bodies = self.rules_of(*fact).iter().map(|rule| &rule.body);
-                    let truth = combine_truths(bodies, &self.with_derived_facts(basic, &derived), true);
+                    let truth =
+                        combine_truths(bodies, &self.with_derived_facts(basic, &derived), true);
                     match truth {
                         Ok(truth) => derived.holding[fact.index()] = truth,
                         Err(fault) => derived.set_unclear(*fact, fault),

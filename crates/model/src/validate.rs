@@ -38,10 +38,12 @@
 //! }
 //! ```
 
+mod abort;
 mod autonomous;
-mod sign_cells;
+mod constraint_monitor;
 mod display;
 mod effects;
+mod evaluate;
 mod execution;
 mod explain;
 mod instant;
@@ -49,14 +51,12 @@ mod interference;
 mod judge;
 mod margin;
 mod metric;
-mod segment;
 mod polynomial;
 mod preferences;
-mod evaluate;
+mod segment;
+mod sign_cells;
 mod state;
-mod abort;
 mod timeline;
-mod constraint_monitor;
 mod trajectory;
 mod violation;
 
@@ -69,7 +69,8 @@ pub use execution::{Execution, MeasuredAmount};
 pub use margin::Margin;
 pub use preferences::{Preferences, ViolatedPreference};
 pub use violation::{
-    ActionInstance, UndecidedReason, ViolationKind, Occurrence, Point, Reason, Undecided, Violation, ConditionTime,
+    ActionInstance, ConditionTime, Occurrence, Point, Reason, Undecided, UndecidedReason,
+    Violation, ViolationKind,
 };
 
 use crate::ground::{Body, Condition};
@@ -262,7 +263,8 @@ fn make_judge(
         running: situation.map_or_else(BTreeMap::new, judge::running),
         last_changes: BTreeMap::new(),
         margins: margin::Margins::default(),
-        trajectory: (!constraints.is_empty()).then(|| trajectory::TrajectoryMonitor::new(&constraints)),
+        trajectory: (!constraints.is_empty())
+            .then(|| trajectory::TrajectoryMonitor::new(&constraints)),
         preferences,
         event_history: autonomous::EventHistory::of(task),
     };

@@ -7,8 +7,8 @@ use elbowroom_stn::uncertain::{BadLink, ContingentLink, LinkId, UncertainNetwork
 use elbowroom_stn::{Constraint, Network, NodeId};
 
 use crate::file::{Correlation, Duration, Format, GivenWait, NetworkFile};
-use crate::report::Report;
 use crate::number::Bound;
+use crate::report::Report;
 
 /// Network that is being read.
 #[derive(Debug)]

@@ -131,7 +131,9 @@ impl<'a> Reader<'a> {
         self.skip_space();
         let at = self.at;
         if depth > DEEPEST {
-            return Err(self.syntax_error("lists and objects are nested too deeply", "flatten them"));
+            return Err(
+                self.syntax_error("lists and objects are nested too deeply", "flatten them")
+            );
         }
         let value = match self.peek() {
             Some(b'{') => self.object(depth)?,

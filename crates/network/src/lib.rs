@@ -24,19 +24,19 @@
 
 mod builder;
 mod derive;
+mod descriptions;
 mod file;
 mod json;
-mod report;
 mod number;
 mod read;
+mod report;
 pub mod weak;
-mod descriptions;
 mod write;
 mod xml;
 
+pub use descriptions::decimal;
 pub use elbowroom_text::{Diagnostics, Source};
 pub use file::{Correlation, Duration, Format, GivenWait, NetworkFile};
 pub use read::read;
 pub use weak::{WeakControllability, weak};
-pub use descriptions::decimal;
 pub use write::{write_graphml, write_json, write_plain};

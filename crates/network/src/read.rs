@@ -14,8 +14,8 @@ use elbowroom_text::{Diagnostics, Source};
 
 use crate::file::NetworkFile;
 use crate::json::{self, Json, Value};
-use crate::report::Report;
 use crate::number::Bound;
+use crate::report::Report;
 
 /// Extensions of files with unsupported kinds of networks, and the names of these kinds.
 const REFUSED: [(&str, &str); 6] = [
@@ -193,7 +193,12 @@ fn number(json: &Json<'_>, report: &mut Report) -> Option<Rational> {
 }
 
 /// Reads a bound under a name; returns `missing` if there is none.
-fn optional_bound(parent: &Json<'_>, name: &str, missing: Bound, report: &mut Report) -> Option<Bound> {
+fn optional_bound(
+    parent: &Json<'_>,
+    name: &str,
+    missing: Bound,
+    report: &mut Report,
+) -> Option<Bound> {
     match parent.member(name) {
         Some(json) if !matches!(json.value, Value::Null) => bound(json, report),
         _ => Some(missing),

@@ -67,7 +67,9 @@ pub enum StepGround {
 /// Decides weak controllability: for all durations within their bounds there is a schedule. Returns
 /// [`Weak::Undecided`] after `most_branches` branches.
 pub fn weak(network: &UncertainNetwork<Rational>, most_branches: usize) -> WeakControllability {
-    if let Some(conflict) = unbounded_link_conflict(network).or_else(|| own_requirement_conflict(network)) {
+    if let Some(conflict) =
+        unbounded_link_conflict(network).or_else(|| own_requirement_conflict(network))
+    {
         return WeakControllability::Uncontrollable(conflict);
     }
     match corner_without_schedule(network, most_branches) {
@@ -127,7 +129,11 @@ pub fn conflict_with(
         }
     });
     let steps: Vec<WeakStep> = steps.collect();
-    let is_used = |id: &LinkId| steps.iter().any(|step| step.ground == StepGround::Link(*id));
+    let is_used = |id: &LinkId| {
+        steps
+            .iter()
+            .any(|step| step.ground == StepGround::Link(*id))
+    };
     let used = durations.iter().filter(|(id, _)| is_used(id));
     Some(WeakConflict {
         durations: used.map(|(&id, duration)| (id, duration.clone())).collect(),

@@ -64,7 +64,11 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn syntax_error<T>(&self, message: impl Into<String>, help: &'static str) -> Result<T, SyntaxError> {
+    fn syntax_error<T>(
+        &self,
+        message: impl Into<String>,
+        help: &'static str,
+    ) -> Result<T, SyntaxError> {
         Err(SyntaxError {
             at: self.at,
             message: message.into(),

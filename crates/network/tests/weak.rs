@@ -121,7 +121,10 @@ fn weak_but_not_dynamic_controllability() {
         };
         UncertainNetwork::new(requirements, vec![link(0, 1), link(2, 3)]).expect("sound")
     };
-    assert_eq!(weak(&network(false), 100), WeakControllability::Controllable);
+    assert_eq!(
+        weak(&network(false), 100),
+        WeakControllability::Controllable
+    );
     assert!(!network(false).is_dynamically_controllable());
     let WeakControllability::Uncontrollable(conflict) = weak(&network(true), 100) else {
         panic!("the durations differ");

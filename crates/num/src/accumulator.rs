@@ -84,7 +84,7 @@ impl Accumulator {
 
 #[cfg(test)]
 mod tests {
-    use super::{Rational, Accumulator};
+    use super::{Accumulator, Rational};
 
     /// Returns numbers of all sizes, the same each time.
     fn numbers() -> impl Iterator<Item = Rational> {

@@ -5,7 +5,7 @@
 
 mod normal;
 
-pub use normal::{exp_of_minus, normal_cdf, normal_between, normal_density};
+pub use normal::{exp_of_minus, normal_between, normal_cdf, normal_density};
 
 use crate::Rational;
 

@@ -27,18 +27,18 @@
 //! # Ok::<(), elbowroom_num::ParseRationalError>(())
 //! ```
 
-pub mod log_concave;
+mod accumulator;
 mod delta;
 mod denominator;
 pub mod enclosures;
 mod interval;
+pub mod log_concave;
 mod rational;
 pub mod simplex;
-mod accumulator;
 pub mod work;
 
+pub use accumulator::Accumulator;
 pub use delta::Delta;
 pub use denominator::CommonDenominator;
 pub use interval::{End, Interval, Side};
 pub use rational::{ParseRationalError, Rational};
-pub use accumulator::Accumulator;

@@ -128,7 +128,11 @@ impl LogConcaveDistribution {
 
     /// Returns a lower bound on the probability that the number, rounded to a multiple of
     /// `resolution`, lies in the closed interval with these ends.
-    pub fn probability_inside(&self, [lower, upper]: [&Rational; 2], resolution: &Rational) -> Rational {
+    pub fn probability_inside(
+        &self,
+        [lower, upper]: [&Rational; 2],
+        resolution: &Rational,
+    ) -> Rational {
         match self {
             Self::Values(values) => share(values, |own| lower <= own && own <= upper),
             Self::Dense(dense) => {
@@ -246,7 +250,10 @@ impl Dense {
     /// concave beyond the bend. If the bend comes before the upper cut, all mass beyond the bend
     /// counts as if it were at the bend.
     pub(crate) fn effective_cuts(&self) -> [Option<Rational>; 2] {
-        let bend = self.density.concavity_limit().map(|bend| bend - &self.margin);
+        let bend = self
+            .density
+            .concavity_limit()
+            .map(|bend| bend - &self.margin);
         let upper = match (self.maximum.clone(), bend) {
             (Some(cut), Some(bend)) => Some(cut.min(bend)),
             (cut, bend) => cut.or(bend),

@@ -2,7 +2,9 @@
 
 use proptest::prelude::*;
 
-use elbowroom_num::log_concave::{Cell, LogConcaveDistribution, CutPosition, Density, Reach, Steps, TangentPoint};
+use elbowroom_num::log_concave::{
+    Cell, CutPosition, Density, LogConcaveDistribution, Reach, Steps, TangentPoint,
+};
 use elbowroom_num::{Rational, enclosures};
 
 fn number(tenths: i64) -> Rational {
@@ -180,7 +182,8 @@ fn probabilities_match_samples() {
     let resolution = Rational::new(1, 10);
     let cuts = [Some(Rational::from(7)), Some(Rational::from(14))];
     let [minimum, maximum] = cuts;
-    let chance = LogConcaveDistribution::dense(density.clone(), minimum, maximum, &resolution).unwrap();
+    let chance =
+        LogConcaveDistribution::dense(density.clone(), minimum, maximum, &resolution).unwrap();
     let draws: Vec<f64> = (0..2000)
         .map(|index| quantile(&density, (f64::from(index) + 0.5) / 2000.0))
         .map(|own| (own.clamp(7.0, 14.0) * 10.0).round() / 10.0)

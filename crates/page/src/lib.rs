@@ -32,7 +32,6 @@
 //! # }
 //! ```
 
-mod state_timeline;
 mod clock;
 pub mod document;
 mod experiment;
@@ -45,6 +44,7 @@ mod perturbed;
 mod plan;
 mod region;
 mod run;
+mod state_timeline;
 
 use elbowroom::answers::{EnvelopeAnswer, PlanAnswer, RegionAnswer, RunAnswer};
 use elbowroom::execute::RunSpec;
@@ -162,7 +162,9 @@ const PERTURBED: &str = "elbowroom-perturbed-results";
 
 fn trace_document(name: &str, text: &str, record: run::Record) -> Result<Document, PageError> {
     let stored = Stored::read(text).map_err(|error| damaged_input(name, &error))?;
-    let spec: RunSpec = stored.header().map_err(|error| damaged_input(name, &error))?;
+    let spec: RunSpec = stored
+        .header()
+        .map_err(|error| damaged_input(name, &error))?;
     Ok(run::trace(name, &stored, &spec, record))
 }
 
@@ -202,7 +204,9 @@ pub fn document(name: &str, text: &str) -> Result<Document, PageError> {
             read::<EnvelopeAnswer>(name, text).map(|it| plan::envelope(&it))
         }
         Some("elbowroom-region") => read::<RegionAnswer>(name, text).map(|it| region::region(&it)),
-        Some("elbowroom-plan") => read::<PlanAnswer>(name, text).map(|it| plan::planner_answer(&it)),
+        Some("elbowroom-plan") => {
+            read::<PlanAnswer>(name, text).map(|it| plan::planner_answer(&it))
+        }
         Some("elbowroom-run") => read::<RunAnswer>(name, text).map(|it| run::outcome(&it)),
         Some("elbowroom-results") => {
             let results = Results::read(text).map_err(|error| damaged_input(name, &error))?;
@@ -210,7 +214,10 @@ pub fn document(name: &str, text: &str) -> Result<Document, PageError> {
         }
         Some(PERTURBED) => {
             let results = perturbed_results(name, text)?;
-            Ok(perturbed::untimed_experiment(&results, experiment::Trials::new()))
+            Ok(perturbed::untimed_experiment(
+                &results,
+                experiment::Trials::new(),
+            ))
         }
         Some("elbowroom-course") => {
             let course = StoredTrial::read(text).map_err(|error| damaged_input(name, &error))?;

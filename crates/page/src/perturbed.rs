@@ -1,11 +1,12 @@
 //! Pages of an experiment in worlds without time, and of one of its trials.
 
 use elbowroom::report::statistics::Proportion;
-use elbowroom_laboratory::perturbed::{PerturbedResults, StoredTrial, StoredStep};
+use elbowroom_laboratory::perturbed::{PerturbedResults, StoredStep, StoredTrial};
 
 use crate::document::{Document, RateGroup, Rates, Section, Table, Text, Tone, Verdict};
 use crate::experiment::{
-    INTERVALS, Trials, document, facts, trial_count_text, mean, column_headings, percent, rate, with_trials,
+    INTERVALS, Trials, column_headings, document, facts, mean, percent, rate, trial_count_text,
+    with_trials,
 };
 use crate::plan::serialized_name;
 
@@ -16,7 +17,11 @@ pub(crate) fn untimed_experiment(results: &PerturbedResults, trials: Trials) -> 
     for row in &results.rows {
         let name = format!("{}, {}", row.case, serialized_name(&row.world));
         let published = row.published.and_then(Proportion::share);
-        let rate = rate(serialized_name(&row.executor), row.success, published.or(row.optimum));
+        let rate = rate(
+            serialized_name(&row.executor),
+            row.success,
+            published.or(row.optimum),
+        );
         rows.push(vec![
             row.case.as_str().into(),
             serialized_name(&row.world).into(),
@@ -99,7 +104,10 @@ fn failures(results: &PerturbedResults, trials: Trials) -> (Option<Section>, Vec
     let mut kinds = Vec::new();
     for (place, row) in results.rows.iter().enumerate() {
         for (kind, failure) in row.failures.kinds().into_iter().enumerate() {
-            let last = failure.cause.as_deref().map_or("there was none", last_step_result);
+            let last = failure
+                .cause
+                .as_deref()
+                .map_or("there was none", last_step_result);
             let cells = vec![
                 row.case.as_str().into(),
                 serialized_name(&row.world).into(),

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use elbowroom::answers::Exact;
 use elbowroom::answers::envelope::timeline::{TimedAction, Timeline, WindowAnswer};
 use elbowroom::answers::envelope::{
-    Counterexample, EnvelopeAnswer, EnvelopeFinding, NominalFailure, LimitedRange, Stop,
+    Counterexample, EnvelopeAnswer, EnvelopeFinding, LimitedRange, NominalFailure, Stop,
 };
 use elbowroom::answers::plan::{PlanAnswer, PlanFinding};
 use elbowroom::execution::run::TimeoutRule;
@@ -30,7 +30,10 @@ pub(crate) fn envelope(answer: &EnvelopeAnswer) -> Document {
         ("domain".to_owned(), answer.domain.clone()),
         ("problem".to_owned(), answer.problem.clone()),
         ("plan".to_owned(), answer.plan.clone()),
-        ("guarantee".to_owned(), serialized_name(&answer.settings.guarantee)),
+        (
+            "guarantee".to_owned(),
+            serialized_name(&answer.settings.guarantee),
+        ),
         ("epsilon".to_owned(), nearest(&answer.settings.epsilon)),
         ("time-out".to_owned(), answer.settings.timeout.in_words()),
     ];
@@ -47,8 +50,10 @@ pub(crate) fn envelope(answer: &EnvelopeAnswer) -> Document {
             facts.push(("boxes checked".to_owned(), checks.to_string()));
             if let Some(timeline) = timeline {
                 sections.push(Section::Chart(chart(timeline, parameters, &mut texts)));
-                let reaches: Vec<SliderInterval<'_>> =
-                    parameters.iter().map(|it| SliderInterval::of(&it.range)).collect();
+                let reaches: Vec<SliderInterval<'_>> = parameters
+                    .iter()
+                    .map(|it| SliderInterval::of(&it.range))
+                    .collect();
                 let sliders = inequalities
                     .as_ref()
                     .and_then(|it| sliders(timeline, &reaches, it));
@@ -156,7 +161,9 @@ pub(crate) fn planner_answer(answer: &PlanAnswer) -> Document {
                 nearest(makespan)
             ))
         }
-        PlanFinding::NoPlan { reason, .. } => negative_verdict(&format!("There is no plan: {reason}")),
+        PlanFinding::NoPlan { reason, .. } => {
+            negative_verdict(&format!("There is no plan: {reason}"))
+        }
         PlanFinding::None { reason, .. } => Verdict {
             tone: Tone::Plain,
             words: format!("It is not known whether there is a plan: {reason}"),
@@ -174,7 +181,9 @@ pub(crate) fn planner_answer(answer: &PlanAnswer) -> Document {
 }
 
 /// Builds a timeline of actions with fixed times: label, name, start and end of each.
-fn fixed_timeline<'a>(actions: impl Iterator<Item = (&'a str, &'a str, Exact, Option<Exact>)>) -> Timeline {
+fn fixed_timeline<'a>(
+    actions: impl Iterator<Item = (&'a str, &'a str, Exact, Option<Exact>)>,
+) -> Timeline {
     let actions = actions.map(|(instance, action, start, end)| TimedAction {
         instance: instance.to_owned(),
         action: action.to_owned(),

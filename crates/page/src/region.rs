@@ -14,7 +14,8 @@ use crate::document::{
     Document, Plane, PlaneBox, PlaneQuantity, PlaneRow, Section, Table, Texts, Tone, Verdict,
 };
 use crate::plan::{
-    SliderInterval, negative_verdict, chart, positive_verdict, name_of, prose, quantities, repair_advice, sliders, times,
+    SliderInterval, chart, name_of, negative_verdict, positive_verdict, prose, quantities,
+    repair_advice, sliders, times,
 };
 use one_at_a_time::{IntervalWithOthersFixed, reach};
 
@@ -46,7 +47,8 @@ pub(crate) fn region(answer: &RegionAnswer) -> Document {
                 let alone: Vec<IntervalWithOthersFixed> = (0..parameters.len())
                     .map(|place| IntervalWithOthersFixed::of(parameters, pieces, place))
                     .collect();
-                let reaches: Vec<SliderInterval<'_>> = alone.iter().zip(parameters).map(reach).collect();
+                let reaches: Vec<SliderInterval<'_>> =
+                    alone.iter().zip(parameters).map(reach).collect();
                 let sliders = inequalities
                     .as_ref()
                     .and_then(|it| sliders(timeline, &reaches, it));
@@ -71,9 +73,9 @@ pub(crate) fn region(answer: &RegionAnswer) -> Document {
                 (_, Some(missing)) => positive_verdict(&format!(
                     "The plan works with all values below. There may be more, for {missing}."
                 )),
-                ([_], None) => {
-                    positive_verdict("The plan works with all values that satisfy the inequalities below.")
-                }
+                ([_], None) => positive_verdict(
+                    "The plan works with all values that satisfy the inequalities below.",
+                ),
                 (several, None) => positive_verdict(&format!(
                     "The plan works with all values that satisfy one of {} lists of inequalities.",
                     several.len()
@@ -85,7 +87,9 @@ pub(crate) fn region(answer: &RegionAnswer) -> Document {
             sections.push(repair_advice());
             negative_verdict("The plan is not valid as it stands.")
         }
-        RegionFinding::Unscheduled => negative_verdict("The plan has no schedule at its nominal values."),
+        RegionFinding::Unscheduled => {
+            negative_verdict("The plan has no schedule at its nominal values.")
+        }
         RegionFinding::None { reason } => Verdict {
             tone: Tone::Plain,
             words: format!("The region is not known: {reason}."),
@@ -143,7 +147,11 @@ fn plane(parameters: &[Quantity], pieces: &[PieceAnswer], boxes: &[BoxAnswer]) -
         let intervals = || boxes.iter().map(|own| own.intervals[place]);
         let lower = intervals().filter_map(|(lower, _)| lower).filter(near);
         let upper = intervals().filter_map(|(_, upper)| upper).filter(near);
-        let alone = || ends_with_others_fixed(&pieces, &all, place).into_iter().filter(near);
+        let alone = || {
+            ends_with_others_fixed(&pieces, &all, place)
+                .into_iter()
+                .filter(near)
+        };
         let from = lower.chain(alone()).fold(nominal - size, f64::min);
         let to = upper.chain(alone()).fold(nominal + 1.5 * size, f64::max);
         // Durations are not negative.

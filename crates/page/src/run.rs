@@ -15,17 +15,17 @@ use elbowroom::learning::records;
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
 use elbowroom::pddl;
-use elbowroom::report::schema::{ObservationLine, ReasonLine, ReportLine};
 use elbowroom::report::decimal::nearest;
+use elbowroom::report::schema::{ObservationLine, ReasonLine, ReportLine};
 use elbowroom::report::trace::{Line, Stored};
 
-use crate::state_timeline::StateTimeline;
 use crate::document::{Chart, Document, Mark, Section, Series, Table, Text, Texts, Tone, Verdict};
 use crate::lanes::{Lanes, Occupant, lanes};
 use crate::plan::{end_of_axis, prose};
 use crate::run::bars::Bars;
 use crate::run::guarantee::Guarantees;
 use crate::run::log::Log;
+use crate::state_timeline::StateTimeline;
 
 /// State of the record of an unfinished run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -7,12 +7,12 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use elbowroom::answers::Exact;
-use elbowroom::execution::{Measured, BeliefState, ActionHandle};
+use elbowroom::execution::{ActionHandle, BeliefState, Measured};
 use elbowroom::model::Task;
 use elbowroom::model::ground::{Action, FactId, FluentId};
 use elbowroom::num::Rational;
-use elbowroom::report::schema::ObservationLine;
 use elbowroom::report::decimal::nearest;
+use elbowroom::report::schema::ObservationLine;
 
 use crate::document::{Change, SeriesLine, Texts};
 use limits::{LimitPeriod, NumericLimits};
@@ -92,9 +92,9 @@ impl<'t> StateTimeline<'t> {
         self.limits
             .started(ActionHandle(ticket), &action, planned, &self.progression);
         let planned = planned.cloned().unwrap_or_default();
-        let _ = self
-            .progression
-            .start(ActionHandle(ticket), &Arc::new(action), &planned, &measured);
+        let _ =
+            self.progression
+                .start(ActionHandle(ticket), &Arc::new(action), &planned, &measured);
         self.record_changes(texts);
     }
 

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use elbowroom::answers::Exact;
 use elbowroom::answers::envelope::{EnvelopeFinding, EnvelopeRequest, envelope};
 use elbowroom::answers::run::simulate;
-use elbowroom::answers::{RunRequest, NoObserver};
+use elbowroom::answers::{NoObserver, RunRequest};
 use elbowroom::execute::{NamedText, RunSpec};
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;

@@ -1,10 +1,10 @@
 //! Plans in the notations of planners.
 
+mod action_like_text;
 mod duration;
 mod form;
 mod line;
 mod lines;
-mod action_like_text;
 mod printed;
 mod read;
 mod step;

@@ -170,7 +170,9 @@ fn is_independent_of_past(constraint: &Constraint) -> bool {
     match constraint {
         Constraint::Modal(modal) => matches!(modal, Modal::AtEnd(_)),
         Constraint::And(parts) => parts.iter().all(is_independent_of_past),
-        Constraint::Forall(_, part) | Constraint::Preference(_, part) => is_independent_of_past(part),
+        Constraint::Forall(_, part) | Constraint::Preference(_, part) => {
+            is_independent_of_past(part)
+        }
     }
 }
 

@@ -56,7 +56,8 @@ const PLAN: &str = "1: (carry b1 kitchen hall) [3]
 
 #[test]
 fn violated_constraint_is_reported_with_time_and_reason() {
-    let constraints = |text: &str| verdict_on(&format!("(:goal (and)) (:constraints {text})"), PLAN);
+    let constraints =
+        |text: &str| verdict_on(&format!("(:goal (and)) (:constraints {text})"), PLAN);
     assert_snapshot!(
         constraints("(within 3 (in b1 hall))"),
         @"at 3.000: the constraint (within 3 (in b1 hall)) is violated: (in b1 hall) does not hold until 3"

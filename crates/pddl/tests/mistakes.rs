@@ -240,7 +240,10 @@ fn decimal_comma_is_reported() {
 fn goal_on_fluent_without_value_is_reported() {
     assert_snapshot!(diagnostics_of("(:init) (:goal (and (lit) (>= (speed) 2)))"), @"problem:1:45: warning: the goal reads `(speed)`, which never gets a value; say `(= (speed) …)` under `:init`");
     assert_eq!(diagnostics_of("(:init) (:goal (>= (level) 2))"), "");
-    assert_eq!(diagnostics_of("(:init (= (speed) 1)) (:goal (>= (speed) 2))"), "");
+    assert_eq!(
+        diagnostics_of("(:init (= (speed) 1)) (:goal (>= (speed) 2))"),
+        ""
+    );
 }
 
 #[test]

@@ -8,7 +8,7 @@ mod skipped;
 use std::path::PathBuf;
 
 use elbowroom_model::Task;
-use elbowroom_model::validate::{ViolationKind, Settings, Verdict, validate};
+use elbowroom_model::validate::{Settings, Verdict, ViolationKind, validate};
 use elbowroom_num::Rational;
 use elbowroom_pddl::{Source, is_unsupported, read_plan, read_problem};
 use skipped::skipped;

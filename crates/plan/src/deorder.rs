@@ -34,7 +34,6 @@
 //! their own ([`Reason::Side`](crate::Reason::Side)), and [`pin_until_sound`] drops those that are
 //! not needed.
 
-mod trajectory;
 pub(crate) mod durations;
 mod implied;
 mod lossless;
@@ -42,6 +41,7 @@ mod order;
 mod over_all;
 mod pin;
 mod self_overlap;
+mod trajectory;
 
 use elbowroom_model::{Footprint, Task, TimeTriggeredPlan};
 use elbowroom_num::{Interval, Rational};
@@ -49,7 +49,9 @@ use elbowroom_stn::ConsistentNetwork;
 
 pub use implied::without_implied;
 pub use lossless::keeps_all_that_is_read;
-pub use pin::{pin_until_sound, with_fixed_times, with_permanent_sides, with_compatible_sides, without_sides};
+pub use pin::{
+    pin_until_sound, with_compatible_sides, with_fixed_times, with_permanent_sides, without_sides,
+};
 
 use crate::network::{Schedule, network_node};
 use crate::stn_plan::{Bound, Constraint, Instance, InstanceId, Node, NodeId, StnPlan};

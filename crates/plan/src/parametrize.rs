@@ -34,9 +34,9 @@
 //! # Ok::<(), elbowroom_plan::parametrize::ParametrizeError>(())
 //! ```
 
+mod builder;
 mod constants;
 mod error;
-mod builder;
 mod quantities;
 mod select;
 mod spec;

@@ -195,7 +195,9 @@ impl ParametrizedPlan {
     pub fn commanded_duration(&self, constraint: &Constraint) -> Option<&Rational> {
         let node = |id: NodeId| self.plan.nodes[id.index()];
         match (node(constraint.from), node(constraint.to)) {
-            (Node::Start(start), Node::End(end)) if start == end => self.commanded_durations.get(&start),
+            (Node::Start(start), Node::End(end)) if start == end => {
+                self.commanded_durations.get(&start)
+            }
             _ => None,
         }
     }

@@ -18,30 +18,29 @@
 //! 6. `run` divides the time among searches: first for any plan, then for better ones.
 //! 7. `refine` improves the best plan.
 
+mod action_elimination;
 mod answer;
 mod apply;
 mod bound;
 mod compile;
-mod trajectory;
+mod deadline_explanation;
+mod end_windows;
 mod expressions;
 mod extract;
 mod formula;
+mod h2;
 mod hash;
 mod landmarks;
+mod local_search;
 mod mutex;
 mod mutex_pairs;
-mod action_elimination;
 mod network;
-mod h2;
-mod deadline_explanation;
-mod local_search;
 mod relaxed;
 mod relevance;
 mod root;
 mod run;
 mod search;
 mod self_overlap;
-mod end_windows;
 mod state;
 mod step_costs;
 mod symbolic;
@@ -49,6 +48,7 @@ mod symmetry;
 #[cfg(test)]
 mod testing;
 mod time;
+mod trajectory;
 mod tuning;
 mod windows;
 
@@ -63,7 +63,7 @@ pub use answer::{Answer, Counts, FoundPlan, Objective, Phase, Progress, Proof, S
 pub use compile::Unsupported;
 pub use tuning::{Member, Technique, Tuning, TuningError};
 
-use compile::{Failure, CompileInput};
+use compile::{CompileInput, Failure};
 use deadline_explanation::Names;
 use run::{Frame, Planner, none_found};
 use symmetry::Symmetry;

@@ -41,6 +41,6 @@
 pub mod embedded;
 
 pub use embedded::{
-    Answer, Counts, FoundPlan, Member, Objective, Phase, Progress, Proof, Settings, Stopped, Technique,
-    Tuning, TuningError, Unsupported, plan,
+    Answer, Counts, FoundPlan, Member, Objective, Phase, Progress, Proof, Settings, Stopped,
+    Technique, Tuning, TuningError, Unsupported, plan,
 };

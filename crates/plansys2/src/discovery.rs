@@ -137,7 +137,11 @@ mod tests {
         census.set_domain_actions(vec!["move".into()]);
         assert_eq!(census.is_over(&hub, seconds(0)), Ok(false));
         assert_eq!(census.is_over(&hub, seconds(2)), Ok(true));
-        assert!(census.actions_without_performer(&hub, seconds(2)).is_empty());
+        assert!(
+            census
+                .actions_without_performer(&hub, seconds(2))
+                .is_empty()
+        );
     }
 
     #[test]

@@ -142,7 +142,8 @@ impl Hub {
     /// Asks the performer to stop. It sends no answer; its status shows when it has stopped.
     pub fn cancel(&mut self, ticket: ActionHandle) {
         let mut deals = self.requests.iter_mut();
-        let its = |(_, it): &(&Key, &mut ActionRequest)| it.action.ticket == ticket && !it.is_cancelled;
+        let its =
+            |(_, it): &(&Key, &mut ActionRequest)| it.action.ticket == ticket && !it.is_cancelled;
         let Some((key, deal)) = deals.find(its) else {
             return;
         };
@@ -242,7 +243,8 @@ impl Hub {
     pub fn status(&mut self, status: &ActionPerformerStatus, now: Duration) {
         let node = &status.node_name;
         let action = status.action.clone();
-        self.performer_states.insert(node.clone(), PerformerState { at: now, action });
+        self.performer_states
+            .insert(node.clone(), PerformerState { at: now, action });
         let mut over: Vec<(Key, Option<String>)> = Vec::new();
         for (key, deal) in &mut self.requests {
             if deal.performer.as_ref() != Some(node) {
@@ -294,7 +296,10 @@ impl Hub {
         let mut lost = Vec::new();
         for (key, deal) in &mut self.requests {
             if let Some(performer) = &deal.performer {
-                let heard = self.performer_states.get(performer).map(|it| it.at.max(deal.since));
+                let heard = self
+                    .performer_states
+                    .get(performer)
+                    .map(|it| it.at.max(deal.since));
                 if heard.is_some_and(|at| now.saturating_sub(at) > PERFORMER_TIMEOUT) {
                     let why = format!(
                         "{performer} is lost: nothing was heard of it for {} s",

@@ -45,9 +45,9 @@ mod world;
 
 pub use discovery::PerformerDiscovery;
 pub use goals::Goals;
-pub use hub::{Action, Effect, Hub, ActionHandle, ActionUpdate};
+pub use hub::{Action, ActionHandle, ActionUpdate, Effect, Hub};
 pub use lifecycle::Lifecycle;
-pub use problem_sync::{Answer, Call, CallId, Key, ProblemSync, ExternalChange};
+pub use problem_sync::{Answer, Call, CallId, ExternalChange, Key, ProblemSync};
 pub use progress::{Progress, plan_text};
 pub use tree::sub_goal;
 pub use world::{Command, World};

@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
 use crate::knowledge::Node;
-pub use change::{Key, ExternalChange};
+pub use change::{ExternalChange, Key};
 use change::{State, Value, change_of};
 
 /// Number of a [`Call`], unique.
@@ -297,7 +297,10 @@ impl ProblemSync {
         if may_read && self.is_stale && self.reading.is_none() {
             self.is_stale = false;
             let touched = if self.sync_state == SyncState::Checking {
-                self.pending_writes.iter().map(|(key, _)| key.clone()).collect()
+                self.pending_writes
+                    .iter()
+                    .map(|(key, _)| key.clone())
+                    .collect()
             } else {
                 BTreeSet::new()
             };

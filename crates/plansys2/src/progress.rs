@@ -179,7 +179,10 @@ mod tests {
         let now = Stamp { sec: 9, nanosec: 0 };
         let left = |progress: &Progress| progress.remaining_plan(&plan()).items;
         assert_eq!(left(&progress), plan().items);
-        for (ticket, told) in [(1, ActionUpdate::Succeeded), (2, ActionUpdate::Failed("it slips".into()))] {
+        for (ticket, told) in [
+            (1, ActionUpdate::Succeeded),
+            (2, ActionUpdate::Failed("it slips".into())),
+        ] {
             progress.begin(&action(ticket, "(move r a b)"));
             progress.update(ticket, &told, now);
         }

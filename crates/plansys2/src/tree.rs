@@ -39,7 +39,9 @@ fn read(text: &str) -> Option<SExpression> {
                 let list = SExpression::List(open.pop()?);
                 open.last_mut()?.push(list);
             }
-            word => open.last_mut()?.push(SExpression::Word(word.to_lowercase())),
+            word => open
+                .last_mut()?
+                .push(SExpression::Word(word.to_lowercase())),
         }
     }
     let mut forms = open.pop().filter(|_| open.is_empty())?;
@@ -88,7 +90,12 @@ fn expression(form: &SExpression, is_negated: bool, nodes: &mut Vec<Node>) -> Op
 }
 
 /// Adds a fact or a fluent.
-fn named(form: &SExpression, node_type: u8, is_negated: bool, nodes: &mut Vec<Node>) -> Option<u32> {
+fn named(
+    form: &SExpression,
+    node_type: u8,
+    is_negated: bool,
+    nodes: &mut Vec<Node>,
+) -> Option<u32> {
     let (name, objects) = headed(form)?;
     let object = |form: &SExpression| match form {
         SExpression::Word(name) => Some(Param {

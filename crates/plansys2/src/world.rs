@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 
-use crate::{Action, ExternalChange, ActionHandle, ActionUpdate};
+use crate::{Action, ActionHandle, ActionUpdate, ExternalChange};
 
 /// Command of Elbowroom.
 #[derive(Clone, Debug, PartialEq)]
@@ -107,7 +107,9 @@ impl World {
                 .map(Command::Begin),
             Some("cancel") => {
                 self.begin_time(now);
-                let runs = |ticket: &ActionHandle| self.started.get(ticket).is_some_and(|it| !it.has_ended);
+                let runs = |ticket: &ActionHandle| {
+                    self.started.get(ticket).is_some_and(|it| !it.has_ended)
+                };
                 ticket.filter(runs).map(Command::Cancel)
             }
             Some(what @ ("wait" | "look")) => {
@@ -235,7 +237,11 @@ impl World {
         let Some(question) = self.pending_wait.take() else {
             return Vec::new();
         };
-        let mut lines: Vec<_> = self.pending_reports.drain(..).map(|it| it.to_string()).collect();
+        let mut lines: Vec<_> = self
+            .pending_reports
+            .drain(..)
+            .map(|it| it.to_string())
+            .collect();
         let mut time = json!({"type": "time", "now": self.time(now)});
         if self.protocol_version >= 2 && !question.number.is_null() {
             time["question"] = question.number;

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use elbowroom_plansys2::message::{ActionExecution, ActionPerformerStatus, kind, state};
-use elbowroom_plansys2::{Action, Effect, Hub, ActionHandle, ActionUpdate};
+use elbowroom_plansys2::{Action, ActionHandle, ActionUpdate, Effect, Hub};
 use rand::{Rng as _, SeedableRng as _, seq::IndexedRandom as _};
 use rand_chacha::ChaCha8Rng;
 

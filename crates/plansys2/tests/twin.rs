@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use elbowroom_plansys2::message::{ActionExecution, ActionPerformerStatus};
-use elbowroom_plansys2::{Action, Effect, Hub, ActionUpdate};
+use elbowroom_plansys2::{Action, ActionUpdate, Effect, Hub};
 use rand::{Rng as _, SeedableRng as _, seq::IndexedRandom as _};
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};

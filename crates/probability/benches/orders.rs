@@ -12,7 +12,7 @@ use elbowroom_plan::NodeId;
 use elbowroom_probability::dispatch::never_interrupt;
 use elbowroom_probability::likelihoods::read;
 use elbowroom_probability::{
-    SearchState, Model, OrderSearch, PrunedNetwork, SearchSettings, Semantics,
+    Model, OrderSearch, PrunedNetwork, SearchSettings, SearchState, Semantics,
 };
 
 fn main() {

@@ -19,10 +19,10 @@ use elbowroom_model::ground::Expression;
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node, NodeId};
 
-use crate::search_state::SearchState;
 use crate::model::evaluate;
 use crate::network::{Happenings, TooCoupled};
 use crate::search::{OrderSearch, Progress};
+use crate::search_state::SearchState;
 use crate::total_order::{Slot, TotalOrderPlan};
 use order_tracking::OrderTracker;
 
@@ -139,7 +139,8 @@ impl LayerDispatch {
         {
             let new = || OrderTracker::new(&self.search, order, self.passed_timed);
             let following = self.tracker.get_or_insert_with(new);
-            if let Some((position, slot)) = following.last_fitting_layer(&self.search, order, circumstances)
+            if let Some((position, slot)) =
+                following.last_fitting_layer(&self.search, order, circumstances)
             {
                 return Ok(next(order, position, slot, false));
             }

@@ -63,24 +63,24 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub mod loss_analysis;
 mod actions;
 mod belief;
-mod search_state;
 pub mod dispatch;
 pub mod likelihoods;
+pub mod loss_analysis;
 mod model;
 mod network;
 pub mod optimum;
 pub mod search;
+mod search_state;
 mod total_order;
 
 pub use actions::{Unsupported, all_actions, all_actions_under};
 pub use belief::Belief;
-pub use search_state::{SearchState, Running};
 pub use dispatch::{Choice, LayerDispatch, NextHappening, Reconsider};
-pub use likelihoods::{SpontaneousChange, Likelihoods, Rate};
+pub use likelihoods::{Likelihoods, Rate, SpontaneousChange};
 pub use model::{Model, Semantics};
 pub use network::{Happenings, Loss, LossCause, PrunedNetwork, Reading, TooCoupled};
-pub use search::{Candidates, SearchResult, OrderSearch, SearchSettings, SearchStop};
+pub use search::{Candidates, OrderSearch, SearchResult, SearchSettings, SearchStop};
+pub use search_state::{Running, SearchState};
 pub use total_order::{Layer, Slot, TotalOrderPlan};

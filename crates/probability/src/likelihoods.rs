@@ -1,9 +1,9 @@
 //! Probabilities of failures and spontaneous changes: [`Likelihoods`].
 
-mod olisipo_format;
 mod failure_model;
 mod file;
 mod names;
+mod olisipo_format;
 mod write;
 
 use std::collections::BTreeMap;
@@ -16,8 +16,8 @@ use elbowroom_text::{Diagnostics, Source};
 
 use crate::belief::Belief;
 
+pub use failure_model::{Argument, FailureModel, FailureOutcome, Outcome, OutcomeChange};
 pub use olisipo_format::read as read_authors;
-pub use failure_model::{FailureOutcome, Argument, FailureModel, Outcome, OutcomeChange};
 pub use write::write;
 
 /// Reads a likelihood file, in Elbowroom's format or in that of Olisipo's authors. The authors'
@@ -216,14 +216,23 @@ impl Likelihoods {
     ///
     /// # Errors
     /// When there is no entry.
-    pub fn spontaneous_change(&self, task: &Task, fact: FactId) -> Result<SpontaneousChange, Missing> {
+    pub fn spontaneous_change(
+        &self,
+        task: &Task,
+        fact: FactId,
+    ) -> Result<SpontaneousChange, Missing> {
         let (predicate, arguments) = task.atom(fact);
-        self.spontaneous_change_of(predicate, &arguments).ok_or_else(|| Missing {
-            what: task.fact_name(fact),
-        })
+        self.spontaneous_change_of(predicate, &arguments)
+            .ok_or_else(|| Missing {
+                what: task.fact_name(fact),
+            })
     }
 
-    pub(crate) fn spontaneous_change_of(&self, predicate: PredicateId, arguments: &[ObjectId]) -> Option<SpontaneousChange> {
+    pub(crate) fn spontaneous_change_of(
+        &self,
+        predicate: PredicateId,
+        arguments: &[ObjectId],
+    ) -> Option<SpontaneousChange> {
         let said = self.merged_entry(predicate, arguments);
         // With a rate per second, the probability per step is optional and defaults to 0.
         let by_time = |rate: Option<f64>| rate.map(|_| 0.0);

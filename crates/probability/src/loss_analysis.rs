@@ -16,10 +16,10 @@
 use elbowroom_model::ground::FactId;
 use elbowroom_plan::{InstanceId, Node, NodeId};
 
-use crate::search_state::SearchState;
-use crate::likelihoods::{SpontaneousChange, Rate};
+use crate::likelihoods::{Rate, SpontaneousChange};
 use crate::model::{Model, is_fact};
 use crate::network::{Happenings, Loss, PrunedNetwork, TooCoupled};
+use crate::search_state::SearchState;
 
 /// Limit on the number of failed attempts that are counted.
 const MAX_ATTEMPTS: usize = 1000;
@@ -263,7 +263,9 @@ impl Model {
     /// does anyway.
     fn with_steady(&self, fact: FactId) -> Option<Self> {
         let position = self.position(fact).filter(|_| is_fact(fact))?;
-        if self.spontaneous_changes[position] == SpontaneousChange::NEVER && self.rates[position] == Rate::NEVER {
+        if self.spontaneous_changes[position] == SpontaneousChange::NEVER
+            && self.rates[position] == Rate::NEVER
+        {
             return None;
         }
         let mut model = self.clone();

@@ -15,7 +15,7 @@ use elbowroom_model::{Step, Task};
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node, NodeId, PartialOrderPlan};
 
-use crate::likelihoods::{SpontaneousChange, Likelihoods, Missing, Rate};
+use crate::likelihoods::{Likelihoods, Missing, Rate, SpontaneousChange};
 
 pub(crate) use requirement::{Requirement, Value, evaluate, visit_facts};
 

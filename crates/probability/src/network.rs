@@ -12,8 +12,8 @@ use elbowroom_model::ground::{Condition, Expression};
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node, NodeId};
 
-use crate::search_state::SearchState;
 use crate::model::{Event, Model, Requirement};
+use crate::search_state::SearchState;
 use clock::Clock;
 use facts::Facts;
 pub(crate) use facts::Snapshot;
@@ -378,7 +378,12 @@ impl<'m> PrunedNetwork<'m> {
     }
 
     /// Applies a happening, given as an event.
-    fn apply_event(&mut self, node: NodeId, event: &Event, is_open: bool) -> Result<(), TooCoupled> {
+    fn apply_event(
+        &mut self,
+        node: NodeId,
+        event: &Event,
+        is_open: bool,
+    ) -> Result<(), TooCoupled> {
         let model = self.model;
         if !self.is_open() {
             self.advance_to(node)?;
@@ -400,7 +405,9 @@ impl<'m> PrunedNetwork<'m> {
         match model.plan().nodes[node.index()] {
             Node::Start(id) => {
                 self.running.push(id);
-                self.clock.ends.push(self.clock.now + model.min_duration(id));
+                self.clock
+                    .ends
+                    .push(self.clock.now + model.min_duration(id));
                 self.undo.push(Undo::Started);
             }
             Node::End(id) => {

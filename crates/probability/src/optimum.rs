@@ -28,14 +28,14 @@
 
 mod process;
 mod small_world;
-mod value_iteration;
 mod table;
+mod value_iteration;
 
 use elbowroom_model::State;
 use elbowroom_plan::{InstanceId, NodeId};
 
-use crate::search_state::SearchState;
 use crate::dispatch::{Choice, NextHappening, goal_holds};
+use crate::search_state::SearchState;
 use crate::total_order::Slot;
 
 pub use process::Perturbed;

@@ -25,10 +25,10 @@ mod memo;
 mod nominal;
 mod postponed;
 mod queue;
-mod time_slack;
 mod run;
 mod separations;
 mod symmetry;
+mod time_slack;
 mod timing;
 
 use std::ops::ControlFlow;
@@ -38,20 +38,20 @@ use elbowroom_model::Step;
 use elbowroom_num::Rational;
 use elbowroom_plan::{Node, NodeId};
 
-use crate::search_state::SearchState;
 use crate::model::Model;
 use crate::network::{Happenings, PrunedNetwork, TooCoupled};
+use crate::search_state::SearchState;
 use crate::total_order::{Slot, TotalOrderPlan};
 use bound::Bounds;
 use cache::Cache;
 use coupling::Couplings;
 pub use lattice::{Lattice, LatticeEdge, LatticeLimits, LatticeNode, TooLarge};
 use nominal::Nominal;
-use time_slack::TimeSlacks;
-pub(crate) use time_slack::{FirstWindow, Suffixes};
 use run::{Best, Run};
 use separations::Separations;
 use symmetry::Symmetry;
+use time_slack::TimeSlacks;
+pub(crate) use time_slack::{FirstWindow, Suffixes};
 use timing::Timing;
 
 /// Sequences that count as orders of the plan.

@@ -6,9 +6,9 @@ use elbowroom_model::ground::{Condition, Expression, FactId};
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node, NodeId};
 
-use crate::search_state::SearchState;
 use crate::model::{Model, evaluate};
 use crate::network::{Happenings, PrunedNetwork};
+use crate::search_state::SearchState;
 
 /// A sequence of happenings, and the layers of the pruned network between them.
 #[doc(alias = "Γ")]

@@ -8,8 +8,8 @@ mod twin;
 use std::collections::BTreeMap;
 
 use elbowroom_plan::{Node, NodeId};
-use elbowroom_probability::loss_analysis::LossAnalysis;
 use elbowroom_probability::likelihoods::{FailureModel, PartialChange, Success};
+use elbowroom_probability::loss_analysis::LossAnalysis;
 use elbowroom_probability::search::{LatticeLimits, TooLarge};
 use elbowroom_probability::{
     Likelihoods, LossCause, Model, OrderSearch, Reading, SearchSettings, Semantics,

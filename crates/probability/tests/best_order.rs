@@ -15,7 +15,7 @@ use elbowroom_probability::dispatch::never_interrupt;
 use elbowroom_probability::likelihoods;
 use elbowroom_probability::search::SearchResult;
 use elbowroom_probability::{
-    Candidates, SearchState, Likelihoods, Model, OrderSearch, PrunedNetwork, SearchSettings,
+    Candidates, Likelihoods, Model, OrderSearch, PrunedNetwork, SearchSettings, SearchState,
     Semantics, TotalOrderPlan,
 };
 use rand::{Rng, SeedableRng};

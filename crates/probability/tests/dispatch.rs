@@ -11,8 +11,8 @@ use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node};
 use elbowroom_probability::dispatch::never_interrupt;
 use elbowroom_probability::{
-    Choice, SearchState, LayerDispatch, Likelihoods, Model, OrderSearch, Reconsider, Running,
-    SearchSettings, Semantics,
+    Choice, LayerDispatch, Likelihoods, Model, OrderSearch, Reconsider, Running, SearchSettings,
+    SearchState, Semantics,
 };
 
 const DOMAIN: &str = "(define (domain letters)
@@ -75,7 +75,11 @@ impl Fixture {
 
     /// Returns the next step in words; a star marks a new order.
     fn next(&mut self) -> String {
-        match self.dispatch.choose(&self.now, &mut never_interrupt).unwrap() {
+        match self
+            .dispatch
+            .choose(&self.now, &mut never_interrupt)
+            .unwrap()
+        {
             Choice::GoalReached => "goal reached".to_owned(),
             Choice::Replan => "replan".to_owned(),
             Choice::Abandon(_) => unreachable!("orders end what they start"),

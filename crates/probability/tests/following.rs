@@ -10,8 +10,8 @@ use elbowroom_num::Rational;
 use elbowroom_plan::NodeId;
 use elbowroom_probability::dispatch::{goal_holds, lattermost_layer, never_interrupt};
 use elbowroom_probability::{
-    Choice, SearchState, LayerDispatch, Likelihoods, Model, OrderSearch, Reconsider, Running,
-    SearchSettings, Semantics, TotalOrderPlan,
+    Choice, LayerDispatch, Likelihoods, Model, OrderSearch, Reconsider, Running, SearchSettings,
+    SearchState, Semantics, TotalOrderPlan,
 };
 
 /// Pseudorandom numbers.

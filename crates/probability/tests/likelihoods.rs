@@ -178,10 +178,15 @@ fn failures_after_start_have_given_effects() {
         (0.8, 0.7)
     );
     assert_eq!(
-        (likelihoods.failure_rate(&shut("a")), likelihoods.end(&shut("a"))),
+        (
+            likelihoods.failure_rate(&shut("a")),
+            likelihoods.end(&shut("a"))
+        ),
         (0.5, 0.8)
     );
-    assert!((likelihoods.success_probability(&shut("a"), 2.0) - 0.8 * (-1.0_f64).exp()).abs() < 1e-15);
+    assert!(
+        (likelihoods.success_probability(&shut("a"), 2.0) - 0.8 * (-1.0_f64).exp()).abs() < 1e-15
+    );
     // Order: undone effects, facts that become true, facts that become false.
     assert_eq!(
         left("a"),

@@ -13,8 +13,8 @@ use elbowroom_probability::dispatch::never_interrupt;
 use elbowroom_probability::likelihoods::FailureModel;
 use elbowroom_probability::optimum::{DeadEnds, Horizon, Move, Perturbed, Settings};
 use elbowroom_probability::{
-    Choice, SearchState, LayerDispatch, Likelihoods, Model, OrderSearch, Reconsider,
-    SearchSettings, Semantics, Slot,
+    Choice, LayerDispatch, Likelihoods, Model, OrderSearch, Reconsider, SearchSettings,
+    SearchState, Semantics, Slot,
 };
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -271,7 +271,10 @@ fn steps_from<'c>(
 fn perturbed(case: &Case, state: &[bool], running: &[InstanceId], left: Left) -> f64 {
     let mut worlds = vec![(Vec::new(), 1.0)];
     for (fact, &is_true) in case.facts().zip(state) {
-        let flip = case.likelihoods.spontaneous_change(&case.task, fact).unwrap();
+        let flip = case
+            .likelihoods
+            .spontaneous_change(&case.task, fact)
+            .unwrap();
         let p = flip.after(f64::from(u8::from(is_true)));
         worlds = worlds
             .into_iter()
@@ -352,7 +355,11 @@ fn everything(task: &Arc<Task>, likelihoods: &Likelihoods) -> (Arc<Task>, Partia
 
 /// Returns the move of an agent that searches the best order before each happening.
 fn adaptable(dispatch: &mut LayerDispatch, circumstances: &SearchState) -> Move {
-    as_move(&dispatch.choose(circumstances, &mut never_interrupt).unwrap())
+    as_move(
+        &dispatch
+            .choose(circumstances, &mut never_interrupt)
+            .unwrap(),
+    )
 }
 
 fn as_move(choice: &Choice) -> Move {

@@ -189,7 +189,10 @@ fn described(case: &Case, order: &[NodeId]) -> Option<String> {
         .iter()
         .map(|&fact| format!("{:?}", case.circumstances.belief.probability(fact)));
     let flips = facts.iter().map(|&fact| {
-        let flip = case.likelihoods.spontaneous_change(&case.task, fact).unwrap();
+        let flip = case
+            .likelihoods
+            .spontaneous_change(&case.task, fact)
+            .unwrap();
         format!("[{:?},{:?}]", flip.becomes_true, flip.becomes_false)
     });
     let mut steps = Vec::new();

@@ -6,7 +6,7 @@ mod shared;
 use elbowroom_plan::NodeId;
 use elbowroom_probability::dispatch::never_interrupt;
 use elbowroom_probability::{
-    Candidates, SearchState, OrderSearch, PrunedNetwork, SearchSettings, Semantics,
+    Candidates, OrderSearch, PrunedNetwork, SearchSettings, SearchState, Semantics,
 };
 use shared::Published;
 

@@ -9,7 +9,7 @@ use elbowroom_pddl::{Source, read_problem};
 use elbowroom_plan::PartialOrderPlan;
 use elbowroom_probability::optimum::{DeadEnds, Perturbed, Settings};
 use elbowroom_probability::{
-    SearchState, Likelihoods, Model, Semantics, all_actions_under, likelihoods,
+    Likelihoods, Model, SearchState, Semantics, all_actions_under, likelihoods,
 };
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -8,7 +8,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 use std::{fs, thread};
 
-use elbowroom::answers::{Event, StopRequest, Observer};
+use elbowroom::answers::{Event, Observer, StopRequest};
 use elbowroom::text::Source;
 use elbowroom_laboratory::answer::{AnyExperiment, CompareAnswer, CompareRequest, compare};
 use elbowroom_laboratory::compare::Part;

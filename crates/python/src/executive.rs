@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-use elbowroom::execution::{Request, ActionHandle};
+use elbowroom::execution::{ActionHandle, Request};
 use elbowroom::executive::documents::{GivenNumber, NewGoal};
 use elbowroom_executive::journal::Segments;
 use elbowroom_executive::request_queue::{ExternalRequest, RequestStatus};
@@ -13,8 +13,8 @@ use elbowroom_executive::run::JournaledOutcome;
 use elbowroom_executive::{ExecutiveSettings, WarningSink};
 use pyo3::prelude::*;
 
+use crate::errors::{CallError, advised, json, number, run_without_gil};
 use crate::task::Task;
-use crate::errors::{CallError, advised, run_without_gil, json, number};
 use crate::world::PyWorld;
 
 /// Persistent run. One thread calls `run`; all other methods can be called from any thread.

@@ -31,17 +31,17 @@
 
 mod campaign;
 mod command;
+mod errors;
 mod executive;
 mod odds;
 mod planner;
 mod plans;
+mod progress_observer;
 mod recorder;
 mod run;
 mod stepper;
 mod stop;
 mod task;
-mod errors;
-mod progress_observer;
 mod world;
 
 use pyo3::prelude::*;
@@ -53,6 +53,8 @@ mod native {
     use crate::campaign::{Experiment, experiment_files};
     #[pymodule_export]
     use crate::command::command;
+    #[pymodule_export]
+    use crate::errors::panic_for_test;
     #[pymodule_export]
     use crate::executive::Executive;
     #[pymodule_export]
@@ -67,8 +69,6 @@ mod native {
     use crate::stop::Stop;
     #[pymodule_export]
     use crate::task::{Task, read};
-    #[pymodule_export]
-    use crate::errors::panic_for_test;
 
     use pyo3::prelude::*;
 

@@ -13,9 +13,9 @@ use elbowroom::text::Source;
 use pyo3::prelude::*;
 use serde::Deserialize;
 
-use crate::task::{Task, read_options};
-use crate::errors::{CallError, run_without_gil, json};
+use crate::errors::{CallError, json, run_without_gil};
 use crate::progress_observer::ProgressObserver;
+use crate::task::{Task, read_options};
 
 /// The options of the success probability, as JSON.
 #[derive(Deserialize)]

@@ -5,11 +5,11 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use elbowroom::answers::plan::{ImprovingPlans, ImprovingPlansRequest, NextPlan};
-use elbowroom::answers::{StopRequest, Observer};
+use elbowroom::answers::{Observer, StopRequest};
 use pyo3::prelude::*;
 
+use crate::errors::{CallError, json, run_without_gil};
 use crate::task::{EVERY_PROCESSOR, Task, threads};
-use crate::errors::{CallError, run_without_gil, json};
 
 /// Interval between two checks for signals.
 const POLL_INTERVAL: Duration = Duration::from_millis(50);
@@ -69,7 +69,9 @@ impl Plans {
             let news = run_without_gil(py, || {
                 let mut search = self.search.lock().unwrap_or_else(PoisonError::into_inner);
                 match search.next_within(patience) {
-                    NextPlan::Better(better) => Ok(PollResult::Document(json(&better.finding), false)),
+                    NextPlan::Better(better) => {
+                        Ok(PollResult::Document(json(&better.finding), false))
+                    }
                     NextPlan::Timeout => Ok(PollResult::None),
                     NextPlan::Ended => match search.answer() {
                         Some(Ok(outcome)) => Ok(PollResult::Document(json(&outcome.answer), true)),
@@ -125,7 +127,9 @@ impl Observer for Clock {
 
     fn flow(&mut self) -> ControlFlow<StopRequest> {
         match self.limit {
-            Some(limit) if self.begun.elapsed() >= limit => ControlFlow::Break(StopRequest::TimeLimit),
+            Some(limit) if self.begun.elapsed() >= limit => {
+                ControlFlow::Break(StopRequest::TimeLimit)
+            }
             _ => ControlFlow::Continue(()),
         }
     }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use elbowroom::answers::{Event, StopRequest, Observer};
+use elbowroom::answers::{Event, Observer, StopRequest};
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 
@@ -93,7 +93,10 @@ impl ProgressObserver {
     }
 
     fn is_report_due(&self) -> bool {
-        self.callback.is_some() && self.last_report.is_none_or(|told| told.elapsed() >= POLL_INTERVAL)
+        self.callback.is_some()
+            && self
+                .last_report
+                .is_none_or(|told| told.elapsed() >= POLL_INTERVAL)
     }
 }
 

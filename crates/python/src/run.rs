@@ -12,12 +12,12 @@ use elbowroom::model;
 use pyo3::prelude::*;
 use serde_json::{Map, Value};
 
+use crate::errors::{CallError, json, run_without_gil};
 use crate::planner::{PyPlanner, Raised};
+use crate::progress_observer::ProgressObserver;
 use crate::recorder::TraceText;
 use crate::stop::Stop;
 use crate::task::{Task, read_options, threads};
-use crate::errors::{CallError, run_without_gil, json};
-use crate::progress_observer::ProgressObserver;
 use crate::world::PyWorld;
 
 /// The executors: name, meaning of the number after the name, summary, source.
@@ -58,7 +58,8 @@ pub(crate) fn run(
 ) -> PyResult<(String, Option<String>, bool, Option<Py<PyAny>>)> {
     let (answer, trace, is_interrupted, raised) = run_without_gil(py, || {
         let spec = problem.specification(options, plan.is_some())?;
-        let watch = ProgressObserver::start(time_limit, progress).with_stop_flag(Arc::clone(&stop.flag));
+        let watch =
+            ProgressObserver::start(time_limit, progress).with_stop_flag(Arc::clone(&stop.flag));
         let raised = Raised::default();
         let task = problem.with_epsilon_of(&spec);
         let first = plan.map(|plan| problem.time_triggered(plan)).transpose()?;
@@ -128,7 +129,11 @@ impl Task {
     }
 
     /// Returns the specification of a run of this problem with these options.
-    pub(crate) fn specification(&self, options: &str, has_plan: bool) -> Result<RunSpec, CallError> {
+    pub(crate) fn specification(
+        &self,
+        options: &str,
+        has_plan: bool,
+    ) -> Result<RunSpec, CallError> {
         let usual = RunSpec {
             has_plan,
             epsilon: self.task.epsilon().clone(),
@@ -140,12 +145,14 @@ impl Task {
         let jobs = options.remove("jobs").filter(|jobs| !jobs.is_null());
         let jobs = jobs.map(serde_json::from_value).transpose();
         let jobs = jobs.map_err(|error| CallError::Request(format!("jobs: {error}")))?;
-        let Value::Object(mut members) = serde_json::to_value(&usual).map_err(CallError::request)?
+        let Value::Object(mut members) =
+            serde_json::to_value(&usual).map_err(CallError::request)?
         else {
             return Ok(usual);
         };
         members.extend(options);
-        let mut spec: RunSpec = serde_json::from_value(members.into()).map_err(CallError::request)?;
+        let mut spec: RunSpec =
+            serde_json::from_value(members.into()).map_err(CallError::request)?;
         check_vary(&self.task, &spec.vary).map_err(CallError::request)?;
         spec.check_planner()?;
         spec.threads = threads(jobs, 1, spec.planner.eq_ignore_ascii_case(EMBEDDED))?;

@@ -10,10 +10,10 @@ use elbowroom::model;
 use elbowroom::num::Rational;
 use pyo3::prelude::*;
 
+use crate::errors::{CallError, json, run_without_gil};
 use crate::planner::Raised;
 use crate::recorder::TraceText;
 use crate::task::Task;
-use crate::errors::{CallError, run_without_gil, json};
 use crate::world::{names, read_observations, read_passage};
 
 /// A run that returns its next request, and receives the answer.
@@ -61,7 +61,10 @@ impl Stepper {
             let raised = Raised::default();
             let stop = Arc::new(AtomicBool::new(false));
             let is_stopped = Arc::clone(&stop);
-            let mut execution = spec.execution(&task)?.beginning_with(first).with_explanations();
+            let mut execution = spec
+                .execution(&task)?
+                .beginning_with(first)
+                .with_explanations();
             execution = execution.with_stop_check(move || is_stopped.load(Ordering::SeqCst));
             execution = if let Some(callable) = planner {
                 execution.with_planner(problem.python_planner(callable, Arc::clone(&stop), &raised))
@@ -148,7 +151,9 @@ impl Stepper {
     fn see(&self, py: Python<'_>, observations: &str) -> PyResult<()> {
         run_without_gil(py, || {
             let seen = read_observations(observations, &self.task).map_err(CallError::request)?;
-            self.run().observe_requested(seen).map_err(CallError::request)
+            self.run()
+                .observe_requested(seen)
+                .map_err(CallError::request)
         })
     }
 

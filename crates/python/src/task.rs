@@ -20,7 +20,7 @@ use elbowroom::{AnyPlan, PlanKind, RoundingRule, dot, pddl};
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::errors::{CallError, run_without_gil, json, number, positive};
+use crate::errors::{CallError, json, number, positive, run_without_gil};
 use crate::progress_observer::ProgressObserver;
 
 /// A problem with its texts.
@@ -225,8 +225,8 @@ impl Task {
             let outcome = if is_embedded {
                 plan::plan(&mut request, &mut watch)?
             } else {
-                let planner =
-                    Planner::named(planner).map_err(|error| CallError::Planner(error.to_string()))?;
+                let planner = Planner::named(planner)
+                    .map_err(|error| CallError::Planner(error.to_string()))?;
                 let sources = [&self.domain, &self.problem];
                 plan::plan_with(&planner, &mut request, sources, limit, &mut watch)?
             };

@@ -187,7 +187,10 @@ fn read(text: &str) -> Result<Value, WorldError> {
     serde_json::from_str(text).map_err(|error| WorldError::new(error.to_string()))
 }
 
-fn read_observation_list(list: Option<&Value>, task: &Task) -> Result<Vec<Observation>, WorldError> {
+fn read_observation_list(
+    list: Option<&Value>,
+    task: &Task,
+) -> Result<Vec<Observation>, WorldError> {
     let list = list.and_then(Value::as_array);
     let list = list.ok_or_else(|| WorldError::new("the observations must be a list"))?;
     let read = |it| wire::read_observation(it, task);

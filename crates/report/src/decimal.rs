@@ -51,14 +51,20 @@ fn round(value: &Rational, digits: u32, rounding: Rounding) -> Rational {
 
 #[cfg(test)]
 mod tests {
-    use super::{Rounding, rounded_inwards, nearest, rounded};
+    use super::{Rounding, nearest, rounded, rounded_inwards};
     use elbowroom_num::Rational;
 
     #[test]
     fn ends_are_rounded_inwards() {
         let third = Rational::new(1, 3);
-        assert_eq!(rounded_inwards(&third, &Rational::ONE, Rounding::Up), "0.334");
-        assert_eq!(rounded_inwards(&third, &Rational::ZERO, Rounding::Down), "0.333");
+        assert_eq!(
+            rounded_inwards(&third, &Rational::ONE, Rounding::Up),
+            "0.334"
+        );
+        assert_eq!(
+            rounded_inwards(&third, &Rational::ZERO, Rounding::Down),
+            "0.333"
+        );
         assert_eq!(rounded_inwards(&third, &third, Rounding::Up), "1/3");
         assert_eq!(rounded(&Rational::new(-1, 3), 0, Rounding::Down), "-1");
         assert_eq!(nearest(&Rational::new(2, 3)), "0.667");

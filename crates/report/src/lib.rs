@@ -26,12 +26,12 @@
 //! assert_eq!(table.csv(), "executor,success %\r\nguarded,95\r\n");
 //! ```
 
+pub mod decimal;
 pub mod exact;
 pub mod lattice;
-pub mod schema;
 pub mod plane;
 pub mod plot;
-pub mod decimal;
+pub mod schema;
 pub mod statistics;
 pub mod table;
 pub mod trace;

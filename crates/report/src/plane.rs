@@ -47,7 +47,10 @@ const TICKS: f64 = 6.0;
 impl PlanePicture {
     /// Renders the picture as an SVG document.
     pub fn svg(&self) -> String {
-        let (width, height) = (LEFT_MARGIN + SIDE + LEGEND_WIDTH, TOP_MARGIN + SIDE + BOTTOM_MARGIN);
+        let (width, height) = (
+            LEFT_MARGIN + SIDE + LEGEND_WIDTH,
+            TOP_MARGIN + SIDE + BOTTOM_MARGIN,
+        );
         let mut svg = String::new();
         let _ = writeln!(
             svg,
@@ -134,7 +137,10 @@ impl PlanePicture {
             };
             share.clamp(0.0, 1.0)
         };
-        (LEFT_MARGIN + SIDE * share(0), TOP_MARGIN + SIDE * (1.0 - share(1)))
+        (
+            LEFT_MARGIN + SIDE * share(0),
+            TOP_MARGIN + SIDE * (1.0 - share(1)),
+        )
     }
 
     fn pixels(&self, point: &[f64; 2]) -> String {
@@ -229,7 +235,13 @@ fn cross(svg: &mut String, (x, y): (f64, f64)) {
 }
 
 fn legend(svg: &mut String, y: f64, words: &str) {
-    text(svg, (LEFT_MARGIN + SIDE + 52.0, y + 6.0), 12, "start", words);
+    text(
+        svg,
+        (LEFT_MARGIN + SIDE + 52.0, y + 6.0),
+        12,
+        "start",
+        words,
+    );
 }
 
 fn text(svg: &mut String, (x, y): (f64, f64), size: u32, anchor: &str, words: &str) {

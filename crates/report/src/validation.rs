@@ -9,9 +9,10 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
-use elbowroom_execution::run::{PROBLEM_GOAL_NAME, GivenGoal, GoalReader, RunSnapshot, Verdict};
+use elbowroom_execution::run::{GivenGoal, GoalReader, PROBLEM_GOAL_NAME, RunSnapshot, Verdict};
 use elbowroom_execution::{
-    Command, Ending, Entry, Event, GoalChange, Measured, Observation, BeliefState, Request, ActionHandle,
+    ActionHandle, BeliefState, Command, Ending, Entry, Event, GoalChange, Measured, Observation,
+    Request,
 };
 use elbowroom_model::ground::{Action, Body, Condition};
 use elbowroom_model::validate::{Execution, MeasuredAmount, Violation};
@@ -316,7 +317,13 @@ impl<'a> Validation<'a> {
         }
     }
 
-    fn process_end(&mut self, ticket: ActionHandle, time: &Rational, succeeded: bool, measured: &[Measured]) {
+    fn process_end(
+        &mut self,
+        ticket: ActionHandle,
+        time: &Rational,
+        succeeded: bool,
+        measured: &[Measured],
+    ) {
         let Some(start) = self.starts.get(&ticket) else {
             return;
         };
@@ -463,8 +470,10 @@ impl<'a> Validation<'a> {
             Verdict::GoalReached => {
                 let is_open = |goal: &mut Goal| !goal.is_queued;
                 let goals: Vec<Goal> = self.goals.extract_if(.., is_open).collect();
-                let unmet =
-                    self.unmet(goals.iter().map(|goal| &goal.condition), Execution::reaches_goal);
+                let unmet = self.unmet(
+                    goals.iter().map(|goal| &goal.condition),
+                    Execution::reaches_goal,
+                );
                 let kept = goals.into_iter().filter(|goal| goal.is_to_keep);
                 self.goals.extend(kept.map(|goal| Goal {
                     is_queued: true,
@@ -479,7 +488,8 @@ impl<'a> Validation<'a> {
             Verdict::Unsolvable => {
                 let mut goals = self.goals.iter().filter(|goal| !goal.is_queued).peekable();
                 let has_goals = goals.peek().is_some();
-                let holds = goals.all(|goal| self.execution.reaches_goal(&goal.condition) == Some(true));
+                let holds =
+                    goals.all(|goal| self.execution.reaches_goal(&goal.condition) == Some(true));
                 if holds && has_goals && self.execution.is_idle() {
                     self.record_finding(Invalid::Reached { time });
                 }

@@ -3,7 +3,7 @@
 //! Numbers are written as `{"exact": "1393/2", "decimal": 696.5}`, and read as that, as a number,
 //! or as a text.
 
-use elbowroom_execution::{Command, Ending, Event, Measured, Observation, ActionHandle};
+use elbowroom_execution::{ActionHandle, Command, Ending, Event, Measured, Observation};
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
 use serde::Serialize;
@@ -88,7 +88,8 @@ fn value(line: &impl Serialize) -> Value {
 pub fn read_observation(message: &Value, task: &Task) -> Result<Observation, WireError> {
     let ticket = || {
         let ticket = message.get("ticket").and_then(Value::as_u64);
-        let ticket = ticket.ok_or_else(|| invalid_message("`ticket` must be the number of a start"));
+        let ticket =
+            ticket.ok_or_else(|| invalid_message("`ticket` must be the number of a start"));
         ticket.map(ActionHandle)
     };
     let event = match field_text(message, "type")? {
@@ -113,7 +114,8 @@ pub fn read_observation(message: &Value, task: &Task) -> Result<Observation, Wir
             let name = field_text(message, "fact")?;
             let fact = task.fact_named(name);
             Event::Fact {
-                fact: fact.ok_or_else(|| invalid_message(format!("the problem has no fact `{name}`")))?,
+                fact: fact
+                    .ok_or_else(|| invalid_message(format!("the problem has no fact `{name}`")))?,
                 truth: message
                     .get("becomes")
                     .and_then(Value::as_bool)
@@ -124,8 +126,9 @@ pub fn read_observation(message: &Value, task: &Task) -> Result<Observation, Wir
             let name = field_text(message, "fluent")?;
             let fluent = task.fluent_named(name);
             Event::Value {
-                fluent: fluent
-                    .ok_or_else(|| invalid_message(format!("the problem has no fluent `{name}`")))?,
+                fluent: fluent.ok_or_else(|| {
+                    invalid_message(format!("the problem has no fluent `{name}`"))
+                })?,
                 value: field_number(message, "value")?,
             }
         }
@@ -184,9 +187,11 @@ fn read_amounts(message: &Value, task: &Task) -> Result<Vec<Measured>, WireError
     let read = |(name, value): (&String, &Value)| {
         let fluent = task.fluent_named(name);
         Ok(Measured {
-            fluent: fluent.ok_or_else(|| invalid_message(format!("the problem has no fluent `{name}`")))?,
-            amount: read_number(value)
-                .ok_or_else(|| invalid_message(format!("the amount of `{name}` must be a number")))?,
+            fluent: fluent
+                .ok_or_else(|| invalid_message(format!("the problem has no fluent `{name}`")))?,
+            amount: read_number(value).ok_or_else(|| {
+                invalid_message(format!("the amount of `{name}` must be a number"))
+            })?,
         })
     };
     entries.iter().map(read).collect()

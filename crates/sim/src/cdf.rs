@@ -94,7 +94,13 @@ pub fn rounding_edge(value: f64, side: Side, resolution: f64) -> f64 {
 impl Rule {
     /// Returns the probability that a value drawn for the planned value `planned` is on that side
     /// of `value`.
-    pub fn probability_of_side(&self, value: f64, side: Side, planned: f64, resolution: f64) -> Option<f64> {
+    pub fn probability_of_side(
+        &self,
+        value: f64,
+        side: Side,
+        planned: f64,
+        resolution: f64,
+    ) -> Option<f64> {
         let edge = rounding_edge(value, side, resolution);
         let scale = if self.is_relative { planned } else { 1.0 };
         if scale <= 0.0 {

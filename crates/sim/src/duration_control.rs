@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use elbowroom_execution::{Command, Event, Observation, TimeAdvance, ActionHandle, World, WorldError};
+use elbowroom_execution::{
+    ActionHandle, Command, Event, Observation, TimeAdvance, World, WorldError,
+};
 use elbowroom_model::ground::{Action, FactId, FluentId};
 use elbowroom_num::Rational;
 

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use elbowroom_execution::{
-    Command, Ending, Event, Observation, TimeAdvance, BeliefState, ActionHandle, World, WorldError,
+    ActionHandle, BeliefState, Command, Ending, Event, Observation, TimeAdvance, World, WorldError,
 };
 use elbowroom_model::Task;
 use elbowroom_model::ground::{FactId, FluentId};
@@ -45,7 +45,12 @@ impl WorldModel {
 impl WorldModel {
     /// Creates a sample of the world that continues from a belief: [`SimWorld::amid`], with the
     /// model's reliability of reports.
-    pub fn world_amid(&self, belief: &BeliefState, seed: u64, past: &ObservedChanges) -> Box<dyn World + '_> {
+    pub fn world_amid(
+        &self,
+        belief: &BeliefState,
+        seed: u64,
+        past: &ObservedChanges,
+    ) -> Box<dyn World + '_> {
         let sim = SimWorld::mid_execution(belief, self, seed, past);
         if self.reports.is_perfect() {
             return Box::new(sim);

@@ -35,19 +35,19 @@
 
 mod cdf;
 pub mod draw;
-mod model;
 mod duration_control;
+mod fault_injection;
+mod model;
 mod pattern;
 mod sim;
-mod fault_injection;
 
 pub use cdf::{Side, rounding_edge};
 pub use draw::{Distribution, Purpose};
+pub use duration_control::{ControlledWorld, DurationController, FixedDurations, StartedAction};
+pub use fault_injection::FaultInjector;
 pub use model::{
-    Amount, FactOutcome, ExogenousEvent, ExogenousChange, FailureRule, FailureTime, Hazard, Outcome, OutcomeChange,
-    ReportReliability, Rule, Template, WorldModel,
+    Amount, ExogenousChange, ExogenousEvent, FactOutcome, FailureRule, FailureTime, Hazard,
+    Outcome, OutcomeChange, ReportReliability, Rule, Template, WorldModel,
 };
-pub use duration_control::{StartedAction, FixedDurations, DurationController, ControlledWorld};
 pub use pattern::ActionPattern;
 pub use sim::{ObservedChanges, SimWorld};
-pub use fault_injection::FaultInjector;

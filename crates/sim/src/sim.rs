@@ -1,15 +1,15 @@
 //! One trajectory of a world.
 
-mod mid_execution;
+mod external_end;
 mod failures;
 mod hazards;
-mod external_end;
+mod mid_execution;
 mod world;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use elbowroom_execution::{Ending, Event, Measured, Observation, BeliefState, ActionHandle};
+use elbowroom_execution::{ActionHandle, BeliefState, Ending, Event, Measured, Observation};
 use elbowroom_model::Task;
 use elbowroom_model::ground::{Action, Body, Change, Condition, Effect, SnapAction};
 use elbowroom_num::Rational;
@@ -17,8 +17,8 @@ use rand::Rng;
 
 use crate::draw::{Purpose, keyed};
 use crate::model::{ExogenousChange, FailureTime, Outcome, WorldModel};
-pub use mid_execution::ObservedChanges;
 use hazards::PoissonProcess;
+pub use mid_execution::ObservedChanges;
 
 /// A simulated world: the true state, and the coming events.
 ///
@@ -146,7 +146,9 @@ impl<'a> SimWorld<'a> {
             // Timed initials can make running actions fail.
             let next = coming.into_iter().chain(self.truth.next_timed());
             let next = next.chain([until]).min().unwrap_or(until).clone();
-            let broken = self.truth.next_over_all_failure(&next, &self.model.resolution);
+            let broken = self
+                .truth
+                .next_over_all_failure(&next, &self.model.resolution);
             let next = broken.into_iter().chain([next]).min().unwrap_or_default();
             // A moving fluent without a value does not get one.
             let _ = self.truth.advance(&next);

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use elbowroom_execution::{
-    Command, Ending, Event, TimeAdvance, BeliefState, ObservedChange, ActionHandle, World,
+    ActionHandle, BeliefState, Command, Ending, Event, ObservedChange, TimeAdvance, World,
 };
 use elbowroom_model::Task;
 use elbowroom_model::ground::Action;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use elbowroom_execution::{Command, Ending, Event, ActionHandle, World};
+use elbowroom_execution::{ActionHandle, Command, Ending, Event, World};
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
 use elbowroom_pddl::{Source, read_problem};

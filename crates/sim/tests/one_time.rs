@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use elbowroom_execution::{Command, Ending, Event, Observation, ActionHandle, World};
+use elbowroom_execution::{ActionHandle, Command, Ending, Event, Observation, World};
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
 use elbowroom_pddl::{Source, read_problem};
@@ -98,7 +98,10 @@ fn simultaneous_ends_are_reported_together_without_violation() {
         (seconds(3000), stage.start("mend", seconds(5000))),
     ];
     let ends = ["0 succeeded".to_owned(), "1 succeeded".to_owned()];
-    assert_eq!(simulate(&stage, &commands), [(seconds(8000), ends.to_vec())]);
+    assert_eq!(
+        simulate(&stage, &commands),
+        [(seconds(8000), ends.to_vec())]
+    );
 }
 
 #[test]

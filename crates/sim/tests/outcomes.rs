@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use elbowroom_execution::{Command, Ending, Event, ActionHandle, World};
+use elbowroom_execution::{ActionHandle, Command, Ending, Event, World};
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
 use elbowroom_pddl::{Source, read_problem};
@@ -80,7 +80,9 @@ fn picked<'a>(
     };
     if let Some(time) = cancelled {
         listen(&mut world, time);
-        let command = Command::Cancel { ticket: ActionHandle(0) };
+        let command = Command::Cancel {
+            ticket: ActionHandle(0),
+        };
         let now = Rational::from(time);
         world.command(&now, &command).expect("simulated");
     }

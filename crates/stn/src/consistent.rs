@@ -117,9 +117,12 @@ impl<W: Weight> ConsistentNetwork<W> {
     pub fn add(&mut self, constraint: Constraint<W>) -> Result<ConstraintId, NegativeCycle<W>> {
         let before = self.checkpoint();
         let id = self.network.add(constraint);
-        let repaired =
-            self.repair
-                .after_adding(id, &self.network, &mut self.schedule, &mut self.previous_times);
+        let repaired = self.repair.after_adding(
+            id,
+            &self.network,
+            &mut self.schedule,
+            &mut self.previous_times,
+        );
         if let Err(cycle) = repaired {
             self.undo_to(before);
             return Err(cycle);

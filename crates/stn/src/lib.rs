@@ -49,20 +49,20 @@
 //! # Ok::<(), elbowroom_stn::NegativeCycle>(())
 //! ```
 
-pub mod corner_search;
 mod bridges;
 mod consistency;
 mod consistent;
+pub mod corner_search;
 mod direction;
-mod small_map;
 mod ids;
 mod implied;
+mod incremental_windows;
 mod lists;
 mod minimal;
-mod incremental_windows;
 mod network;
 mod paths;
 mod schedule;
+mod small_map;
 #[cfg(feature = "testing")]
 pub mod testing;
 pub mod uncertain;
@@ -73,8 +73,8 @@ pub use consistency::NegativeCycle;
 pub use consistent::{Checkpoint, ConsistentNetwork};
 pub use direction::Direction;
 pub use ids::{ConstraintId, NodeId};
-pub use minimal::Minimal;
 pub use incremental_windows::{Grounds, IncrementalWindows, OutOfWindow, WindowEnd};
+pub use minimal::Minimal;
 pub use network::{Constraint, Network};
 pub use paths::ShortestPaths;
 pub use schedule::Schedule;

@@ -19,18 +19,18 @@
 //! controllable, a [`Conflict`] is the proof, and a [`Spoiler`] chooses durations that make every
 //! executor fail.
 
+mod adversary;
 mod conflict;
 mod dispatchable;
 mod dispatcher;
 mod dynamic;
 mod extended;
 mod graph;
+mod integer_network;
 mod order;
 mod recheck;
 mod refutation;
-mod adversary;
 mod strong;
-mod integer_network;
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -39,15 +39,15 @@ use elbowroom_num::Rational;
 
 use crate::{Network, NodeId, Weight};
 
+pub use adversary::Adversary;
 pub use conflict::{Conflict, Ground, Step};
 pub use dispatchable::{Dispatchable, DispatchableEdge, Wait};
 pub use dispatcher::{Dispatcher, Missed};
 pub use extended::Extended;
+pub use integer_network::{IntegerNetwork, Unit};
 pub use recheck::Recheck;
-pub use refutation::{Part, Refutation, Refuted, RefutationPath};
-pub use adversary::Adversary;
+pub use refutation::{Part, Refutation, RefutationPath, Refuted};
 pub use strong::StrongConflict;
-pub use integer_network::{Unit, IntegerNetwork};
 
 /// Contingent link `lower <= end - activation <= upper`; the world chooses the difference.
 #[derive(Clone, Debug, PartialEq, Eq)]

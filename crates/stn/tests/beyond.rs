@@ -134,7 +134,8 @@ impl Run {
             let Some(missed) = missed else {
                 continue;
             };
-            let bears = missed.is_only_link && self.dispatcher.stays_executable(link.end, &self.now);
+            let bears =
+                missed.is_only_link && self.dispatcher.stays_executable(link.end, &self.now);
             self.compare(bears, &mut counts.ended, &mut counts.late, told)?;
         }
     }
@@ -230,7 +231,8 @@ impl Run {
             self.now += 1;
         }
         for constraint in self.network.requirements().constraints() {
-            let times = [constraint.to, constraint.from].map(|node| self.dispatcher.event_time(node));
+            let times =
+                [constraint.to, constraint.from].map(|node| self.dispatcher.event_time(node));
             if let [Some(to), Some(from)] = times {
                 assert!(to - from <= constraint.bound, "{told}");
             }

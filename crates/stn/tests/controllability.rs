@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 use elbowroom_num::Rational;
 use elbowroom_stn::uncertain::{
-    ContingentLink, Dispatchable, Dispatcher, Adversary, UncertainNetwork,
+    Adversary, ContingentLink, Dispatchable, Dispatcher, UncertainNetwork,
 };
 use elbowroom_stn::{Constraint, Network, NodeId, Weight};
 use game::{Board, Random};

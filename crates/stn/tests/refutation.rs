@@ -8,7 +8,9 @@
 
 mod game;
 
-use elbowroom_stn::uncertain::{ContingentLink, Part, Refutation, Refuted, UncertainNetwork, RefutationPath};
+use elbowroom_stn::uncertain::{
+    ContingentLink, Part, Refutation, RefutationPath, Refuted, UncertainNetwork,
+};
 use elbowroom_stn::{Constraint, Network, NodeId};
 use game::{Board, Random};
 

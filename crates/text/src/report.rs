@@ -87,7 +87,8 @@ impl Report {
     /// Returns all findings, by position, if there was an error. A reader without a value must have
     /// reported an error.
     pub fn finish<T>(mut self, value: Option<T>) -> Result<(T, Vec<Diagnostic>), Diagnostics> {
-        self.findings.sort_by_key(|found| found.labels[0].span.start);
+        self.findings
+            .sort_by_key(|found| found.labels[0].span.start);
         Diagnostics::outcome(value, self.findings)
     }
 

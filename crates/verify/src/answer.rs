@@ -12,7 +12,7 @@ use serde_json::Value;
 
 use crate::certificate::{Certificate, Chance, End as Side, Guarantee, Parameter, Reasons};
 use crate::check::{InsideCheck, Verified, verify};
-use crate::derive::{self, NotDerived, Plan, Quantity, LabelText};
+use crate::derive::{self, LabelText, NotDerived, Plan, Quantity};
 use crate::flaw::Flaw;
 use crate::given::GivenPlan;
 use crate::sound::Endless;
@@ -227,7 +227,8 @@ pub fn verify_answer_of_network(
 /// Distribution of the duration of an action in a world, from the action's name and its planned
 /// duration; `None` if it is always the planned one. The error is the reason why a world's
 /// distribution cannot be compared.
-pub type Distributions<'a> = &'a dyn Fn(&str, &Rational) -> Result<Option<log_concave::LogConcaveDistribution>, String>;
+pub type Distributions<'a> =
+    &'a dyn Fn(&str, &Rational) -> Result<Option<log_concave::LogConcaveDistribution>, String>;
 
 /// Checks as [`verify_answer_of`] does. For a box of the objective `probability` it also checks that the
 /// parameters are distributed as in a world; without one, this is the only assumption of the verdict.

@@ -8,7 +8,7 @@ use crate::bounds::EndExpression;
 use crate::certificate::{Case, Certificate, Exact, Parameter, Proof, Reasons, Source, Stopped};
 use crate::flaw::Flaw;
 use crate::intervals::Intervals;
-use crate::probability::{VariableDistributions, NEVER};
+use crate::probability::{NEVER, VariableDistributions};
 use crate::sound::{Control, Sound};
 use crate::{claim, conditions, control, network, row, volume};
 
@@ -363,7 +363,10 @@ impl<'a> Checker<'a> {
     /// Returns by how much each inequality of a proof is violated when no variable has more slack,
     /// in relation to its scale, than this one.
     fn over(&self, variable: usize, proof: usize) -> Result<Vec<Rational>, Flaw> {
-        let rows = self.rows.get(proof).ok_or(Flaw::UnknownReference("proof", proof))?;
+        let rows = self
+            .rows
+            .get(proof)
+            .ok_or(Flaw::UnknownReference("proof", proof))?;
         let level = self.relative_slack(variable)?;
         let over = rows.iter().map(|row| {
             let mut sum = -&row.bound;

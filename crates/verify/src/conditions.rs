@@ -12,7 +12,9 @@ use elbowroom_num::Rational;
 use crate::certificate::{Certificate, Constraint, Limit};
 use crate::flaw::Flaw;
 use crate::intervals::Intervals;
-use crate::sound::{Condition, Difference, FailureCase, Ground, Inequality, Multiplied, Summand, Violation};
+use crate::sound::{
+    Condition, Difference, FailureCase, Ground, Inequality, Multiplied, Summand, Violation,
+};
 
 /// Largest number of parameters of one violation whose ends are combined.
 const MAX_CORNERS: usize = 8;
@@ -93,7 +95,9 @@ impl Checker<'_> {
                         open.push((*case, differences));
                     }
                 }
-                FailureCase::Never(sum) => self.check_contradiction(sum, (&differences, &[]), self.intervals)?,
+                FailureCase::Never(sum) => {
+                    self.check_contradiction(sum, (&differences, &[]), self.intervals)?
+                }
                 FailureCase::Ways(ways) => {
                     for way in ways {
                         self.check_violation(way, &differences)?;

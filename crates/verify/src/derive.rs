@@ -40,7 +40,6 @@
 //! Plans that need more are [not derivable](NotDerived::Unknown). Examples are conditions on numbers that are not
 //! linear in times and parameters. Where nothing reads such a number, its value does not matter.
 
-mod trajectory;
 mod decisions;
 mod distances;
 mod failures;
@@ -53,6 +52,7 @@ mod numbers;
 mod offset_components;
 mod point_state;
 mod subject;
+mod trajectory;
 mod valid;
 
 use std::collections::BTreeMap;
@@ -66,7 +66,6 @@ use crate::flaw::Flaw;
 use crate::given::GivenPlan;
 use crate::intervals::Intervals;
 use crate::sound::Control;
-use trajectory::TrajectoryDerivation;
 use distances::Distances;
 use failures::Failure;
 use given::Given;
@@ -76,6 +75,7 @@ use linear::Linear;
 use numbers::Numbers;
 use offset_components::OffsetComponents;
 use subject::Subject;
+use trajectory::TrajectoryDerivation;
 
 /// Reason for a certificate that cannot be shown to be about a plan.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

@@ -70,9 +70,9 @@ pub use answer::{
 pub use bounds::EndExpression;
 pub use certificate::{
     Case, Certificate, Chance, Constraint, End, Exact, Guarantee, Limit, Multiplier, Parameter,
-    Part, Proof, Reasons, Shape, Source, Stopped, Sum, Term, Total, Touch, Path, sound,
+    Part, Path, Proof, Reasons, Shape, Source, Stopped, Sum, Term, Total, Touch, sound,
 };
-pub use check::{InsideCheck, Verified, with_sums, verify};
+pub use check::{InsideCheck, Verified, verify, with_sums};
 pub use derive::{NotDerived, Plan};
 pub use flaw::Flaw;
 pub use given::{GivenConstraint, GivenInstance, GivenParameter, GivenPlan};

@@ -25,14 +25,14 @@
 //! searches neither for a list nor for plans. Programs that generate certificates can use the same
 //! [`Instances`].
 
-mod initial_state;
 pub mod closed;
-mod instances;
-mod static_facts;
 mod earliest_times;
+mod initial_state;
+mod instances;
 pub mod pairs;
 mod processes;
 mod relevance;
+mod static_facts;
 mod valueless;
 
 use std::collections::BTreeMap;
@@ -44,8 +44,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::Exact;
 pub use closed::{ClosedSet, ClosedState};
-pub use instances::{Breach, Instances};
 use earliest_times::{ConditionContext, EarliestTimes};
+pub use instances::{Breach, Instances};
 use pairs::Structure;
 
 /// A predicate and its objects.
@@ -256,7 +256,10 @@ pub fn verify_no_plan_from(
     if let Some((pair, by)) = structure.first_violation(&claims) {
         return Err(NoPlanFlaw::Together {
             pair: structure.describe_claim(pair),
-            by: by.map_or_else(|| "the beginning".to_owned(), |by| structure.describe_happening(by)),
+            by: by.map_or_else(
+                || "the beginning".to_owned(),
+                |by| structure.describe_happening(by),
+            ),
         });
     }
     if structure.is_goal_excluded(&claims) {

@@ -187,7 +187,10 @@ pub(crate) fn enclosure(
         least = enclosures::floor_to_billionth(&(least * inside));
     }
     let [_, most] = enclosures::exp_of_minus(&(-bound).max(Rational::ZERO));
-    Some([least, enclosures::ceil_to_billionth(&most).min(Rational::ONE)])
+    Some([
+        least,
+        enclosures::ceil_to_billionth(&most).min(Rational::ONE),
+    ])
 }
 
 /// Returns the point of contact with its numbers; `None` if it is not in the cell.

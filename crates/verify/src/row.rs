@@ -3,7 +3,7 @@
 use elbowroom_num::Rational;
 
 use crate::bounds::EndExpression;
-use crate::certificate::{Certificate, Constraint, End, Guarantee, Limit, Part, Proof, Sum, Path};
+use crate::certificate::{Certificate, Constraint, End, Guarantee, Limit, Part, Path, Proof, Sum};
 use crate::flaw::Flaw;
 
 /// Largest number of sums of one proof.
@@ -24,7 +24,10 @@ pub fn sums(certificate: &Certificate, proof: &Proof) -> Result<Vec<EndExpressio
             vec![reader.fixed(parts)?]
         }
         Proof::Semireducible { ways, cycle } if certificate.guarantee != Guarantee::Weak => {
-            let reader = PathReader { certificate, paths: ways };
+            let reader = PathReader {
+                certificate,
+                paths: ways,
+            };
             reader.is_tree(cycle)?;
             reader.semireducible(cycle)?
         }
@@ -59,7 +62,9 @@ struct PathReader<'a> {
 
 impl PathReader<'_> {
     fn path(&self, index: usize) -> Result<&Path, Flaw> {
-        self.paths.get(index).ok_or(Flaw::UnknownReference("way", index))
+        self.paths
+            .get(index)
+            .ok_or(Flaw::UnknownReference("way", index))
     }
 
     /// Checks that each way is mentioned once, by the cycle or by a later way.
@@ -191,9 +196,9 @@ impl PathReader<'_> {
             Limit::None => Err(Flaw::NoLimit),
             Limit::Number(number) => Ok(EndExpression::number(&number.0 * &Rational::from(sign))),
             // An upper bound counts with its least value, a lower bound with its greatest value.
-            Limit::Parameter(parameter) if *parameter < self.certificate.parameters.len() => {
-                Ok(EndExpression::end(2 * parameter + usize::from(!is_most), sign))
-            }
+            Limit::Parameter(parameter) if *parameter < self.certificate.parameters.len() => Ok(
+                EndExpression::end(2 * parameter + usize::from(!is_most), sign),
+            ),
             Limit::Parameter(parameter) => Err(Flaw::UnknownReference("parameter", *parameter)),
         }
     }
@@ -290,7 +295,11 @@ impl PathReader<'_> {
 
     /// Returns the possible lengths of a way; the greatest one counts. Adds to `legal` the sums
     /// that have to be negative for the rules to apply.
-    fn lengths(&self, way: &Path, legal: &mut Vec<EndExpression>) -> Result<Vec<EndExpression>, Flaw> {
+    fn lengths(
+        &self,
+        way: &Path,
+        legal: &mut Vec<EndExpression>,
+    ) -> Result<Vec<EndExpression>, Flaw> {
         self.ends_of(&way.parts)?;
         let waits_for = match way.parts.last() {
             Some(Part::Late(index)) => Some(*index),
@@ -335,7 +344,10 @@ impl PathReader<'_> {
 }
 
 /// Returns all sums of an element of each list.
-fn all_sums(mut some: Vec<EndExpression>, others: &[EndExpression]) -> Result<Vec<EndExpression>, Flaw> {
+fn all_sums(
+    mut some: Vec<EndExpression>,
+    others: &[EndExpression],
+) -> Result<Vec<EndExpression>, Flaw> {
     if some.len() * others.len() > MAX_SUMS {
         return Err(Flaw::TooLong);
     }

@@ -159,7 +159,10 @@ fn changed(network: &UncertainNetwork<i64>, random: &mut Random) -> UncertainNet
 }
 
 /// Returns the network with a link of unbounded duration.
-fn with_unbounded_link(network: &UncertainNetwork<i64>, random: &mut Random) -> UncertainNetwork<i64> {
+fn with_unbounded_link(
+    network: &UncertainNetwork<i64>,
+    random: &mut Random,
+) -> UncertainNetwork<i64> {
     let mut links = network.links().to_vec();
     if !links.is_empty() {
         let index = random.below(links.len());

@@ -24,12 +24,12 @@ use elbowroom::sim::WorldModel;
 use elbowroom::{AnyPlan, PlanKind, RoundingRule};
 use serde_json::json;
 
+use crate::deadline_observer::DeadlineObserver;
 use crate::question::{
     CheckQuestion, EnvelopeQuestion, Method, PageQuestion, PlanQuestion, Question, RunQuestion,
     StnQuestion, Text,
 };
 use crate::reply::{Failure, Reply, document};
-use crate::deadline_observer::DeadlineObserver;
 
 /// Exit codes, see `docs/exit-codes.md`.
 const YES: u8 = 0;
@@ -75,7 +75,11 @@ impl ParsedProblem {
         self.parse_plan_with_rounding(text, &RoundingRule::default())
     }
 
-    fn parse_plan_with_rounding(&mut self, text: &Text, rule: &RoundingRule) -> Result<AnyPlan, Failure> {
+    fn parse_plan_with_rounding(
+        &mut self,
+        text: &Text,
+        rule: &RoundingRule,
+    ) -> Result<AnyPlan, Failure> {
         let has_name_of_stn = text.name.to_ascii_lowercase().ends_with(".stn");
         if has_name_of_stn || PlanKind::of_text(&text.text) == PlanKind::Stn {
             return Ok(AnyPlan::Stn(format::read(text.source(), &self.task)?));
@@ -156,7 +160,8 @@ fn find_plan(
         self_overlap: question.self_overlap,
         threads: 1,
     };
-    let mut outcome = plan(&mut request, &mut DeadlineObserver::start(clock, limit)).map_err(Failure::new)?;
+    let mut outcome =
+        plan(&mut request, &mut DeadlineObserver::start(clock, limit)).map_err(Failure::new)?;
     let files = [&question.domain.name[..], &question.problem.name];
     outcome.answer.name_files(files);
     Ok(Reply {
@@ -349,7 +354,8 @@ fn execute_plan(
     let request = RunRequest::new(&spec, &task)
         .beginning_with(first)
         .recorded_by(&mut writer);
-    let outcome = simulate(request, &mut DeadlineObserver::start(clock, None)).map_err(contradiction)?;
+    let outcome =
+        simulate(request, &mut DeadlineObserver::start(clock, None)).map_err(contradiction)?;
     Ok(Reply {
         exit: match outcome.verdict() {
             Verdict::GoalReached => YES,

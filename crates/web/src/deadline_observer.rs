@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use elbowroom::answers::{StopRequest, Observer};
+use elbowroom::answers::{Observer, StopRequest};
 
 /// Watcher that ends the work at a time limit, if there is one.
 pub(crate) struct DeadlineObserver<'a> {

@@ -20,9 +20,9 @@
 
 pub mod abi;
 mod answer;
+mod deadline_observer;
 mod question;
 mod reply;
-mod deadline_observer;
 
 use std::time::Duration;
 

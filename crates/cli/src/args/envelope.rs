@@ -9,7 +9,7 @@ use elbowroom::execution::run::TimeoutRule;
 use elbowroom::num::Rational;
 
 use super::ProblemArgs;
-use super::number::{positive, positive_or_zero, timeout, integer};
+use super::number::{integer, positive, positive_or_zero, timeout};
 use crate::exit::Failure;
 
 #[derive(Args, Debug)]

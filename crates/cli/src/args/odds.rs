@@ -7,7 +7,7 @@ use elbowroom::answers::odds::OddsSemantics;
 use elbowroom::num::Rational;
 
 use super::ProblemArgs;
-use super::number::{count, positive, integer};
+use super::number::{count, integer, positive};
 
 #[derive(Args, Debug)]
 #[expect(

@@ -11,7 +11,7 @@ use elbowroom::num::Rational;
 
 use super::CalendarArgs;
 use super::envelope::{BoxMethod, Guarantee, Objective, controllable};
-use super::number::{count, factor, positive, positive_or_zero, timeout, integer};
+use super::number::{count, factor, integer, positive, positive_or_zero, timeout};
 use super::plan::EMBEDDED;
 use crate::exit::Failure;
 use elbowroom_executive::http::Address;

@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 use elbowroom::RoundingRule;
 use elbowroom::answers::RequestError;
 use elbowroom::answers::check::{
-    CheckAnswer, CheckFinding, CheckRequest, FluentValue, MarginAnswer, ValidationReport,
-    PreferenceAnswer, ProblemSummary, check,
+    CheckAnswer, CheckFinding, CheckRequest, FluentValue, MarginAnswer, PreferenceAnswer,
+    ProblemSummary, ValidationReport, check,
 };
 use elbowroom::model::Task;
 use elbowroom::model::validate::Settings;
@@ -15,8 +15,8 @@ use elbowroom::text::{Record, Severity};
 use crate::args::{CheckArgs, DiagnosticsForm};
 use crate::exit::{Answer, Exit, Failure};
 use crate::limits::push_wrapped;
-use crate::terminal::{ERROR, SECONDARY, SUCCESS, TextLayout, EMPHASIS, styled};
 use crate::output::Output;
+use crate::terminal::{EMPHASIS, ERROR, SECONDARY, SUCCESS, TextLayout, styled};
 use crate::{input, number, output};
 use elbowroom_executive::messages::count_with_noun;
 

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
-use elbowroom::answers::{Event, StopRequest, Observer};
+use elbowroom::answers::{Event, Observer, StopRequest};
 use elbowroom::report::table::Table;
 use elbowroom_laboratory::answer::{
     AnyExperiment, CompareAnswer, CompareError, CompareRequest, FailurePosition, compare_recorded,
@@ -15,9 +15,9 @@ use elbowroom_laboratory::record::TrialRecords;
 use crate::args::CompareArgs;
 use crate::exit::{Answer, Exit, Failure};
 use crate::interrupt::Interrupt;
-use crate::terminal::{ERROR, TextLayout, styled};
 use crate::output::Output;
 use crate::progress::Progress;
+use crate::terminal::{ERROR, TextLayout, styled};
 use crate::time_limit::Stopwatch;
 use crate::{input, output};
 use elbowroom_executive::messages::io_error_message;
@@ -39,8 +39,13 @@ pub(crate) fn run(arguments: &CompareArgs, output: &mut Output) -> Answer {
         .unwrap_or_default();
     let file = |name: &str| {
         let path = folder.join(name);
-        fs::read_to_string(&path)
-            .map_err(|error| format!("cannot read {}: {}", path.display(), io_error_message(&error)))
+        fs::read_to_string(&path).map_err(|error| {
+            format!(
+                "cannot read {}: {}",
+                path.display(),
+                io_error_message(&error)
+            )
+        })
     };
     // An unwritable folder is reported before the trials, not after hours of them.
     if let Some(folder) = &arguments.output {
@@ -75,7 +80,9 @@ pub(crate) fn run(arguments: &CompareArgs, output: &mut Output) -> Answer {
             for note in invalid {
                 output::print_to_stderr(&styled(ERROR, &note));
             }
-            output::print_to_stderr("Please report it. With `-o DIR`, DIR/failures has the traces.");
+            output::print_to_stderr(
+                "Please report it. With `-o DIR`, DIR/failures has the traces.",
+            );
             Exit::Bug
         } else if answer.is_interrupted() {
             Exit::Interrupted

@@ -17,9 +17,9 @@ use serde_json::Value;
 
 use crate::args::{CtlArgs, CtlCommand};
 use crate::exit::{Answer, Exit, Failure};
-use crate::terminal::{TextLayout, EMPHASIS, styled};
 use crate::number::nearest;
 use crate::output::{self, Output};
+use crate::terminal::{EMPHASIS, TextLayout, styled};
 use crate::wrap::wrap;
 use elbowroom::num::work::Stop;
 use elbowroom_executive::http::{self, AccessControl};

@@ -1,9 +1,9 @@
 //! `elbowroom envelope`: tolerated deviations of quantities.
 
 mod exact;
+mod monitor;
 mod repair;
 mod text;
-mod monitor;
 
 use std::sync::Arc;
 
@@ -14,8 +14,8 @@ use elbowroom::plan::parametrize::VarySpec;
 
 use crate::args::{self, EnvelopeArgs};
 use crate::exit::{Answer, Exit, Failure};
-use crate::terminal::TextLayout;
 use crate::output::Output;
+use crate::terminal::TextLayout;
 use crate::{input, output};
 use monitor::EnvelopeMonitor;
 

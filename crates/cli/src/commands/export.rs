@@ -9,18 +9,18 @@ use elbowroom::RoundingRule;
 use elbowroom::answers::{EnvelopeAnswer, EnvelopeRequest};
 use elbowroom::envelope::Guarantee;
 use elbowroom::export::{self, ExportError};
-use elbowroom::pipeline::PipelineError;
 use elbowroom::model::Task;
 use elbowroom::network::{NetworkFile, write_graphml, write_json, write_plain};
 use elbowroom::parse_box;
+use elbowroom::pipeline::PipelineError;
 use elbowroom::plan::{DecoupledEnvelope, ParametrizedPlan};
 
 use crate::args::{self, ExportArgs, ExportFormat};
 use crate::commands::envelope::specifications;
 use crate::exit::{Answer, Exit, Failure};
 use crate::limits::push_wrapped;
-use crate::terminal::{ERROR, HINT, TextLayout, styled};
 use crate::output::Output;
+use crate::terminal::{ERROR, HINT, TextLayout, styled};
 use crate::{input, output};
 
 /// Writes a network, a box check or a region.
@@ -59,7 +59,12 @@ pub(crate) fn run(arguments: &ExportArgs, output: &mut Output) -> Answer {
         Err(PipelineError::Invalid(violation)) => {
             let file = file.display();
             let mut text = format!("{}: {file} does not work\n", styled(ERROR, "invalid"));
-            push_wrapped(&mut text, &violation.to_string(), 2, TextLayout::PLAIN.width);
+            push_wrapped(
+                &mut text,
+                &violation.to_string(),
+                2,
+                TextLayout::PLAIN.width,
+            );
             output::print_to_stderr(text.trim_end());
             input::advise_repair();
             return Ok(Exit::No);

@@ -6,9 +6,9 @@ use std::sync::Arc;
 use elbowroom::RoundingRule;
 use elbowroom::answers::NoObserver;
 use elbowroom::answers::learn::{
-    LearntAction, ConformalBox, DriftAnswer, LearntDurations, FitAnswer, GroupAnswer,
-    ConformalRequest, LearnAnswer, LearnRequest, Log, LogError, PredictionAnswer, LearntRate,
-    Settings, Verdict, mean_planned_and_actual, learn,
+    ConformalBox, ConformalRequest, DriftAnswer, FitAnswer, GroupAnswer, LearnAnswer, LearnRequest,
+    LearntAction, LearntDurations, LearntRate, Log, LogError, PredictionAnswer, Settings, Verdict,
+    learn, mean_planned_and_actual,
 };
 use elbowroom::num::{End, Rational};
 use elbowroom::report::table::Table;
@@ -17,8 +17,8 @@ use crate::args::{LearnArgs, ProblemArgs};
 use crate::exit::{Answer, Exit, Failure};
 use crate::input;
 use crate::limits::{push_paragraph, push_wrapped};
-use crate::terminal::{ERROR, SUCCESS, HINT, TextLayout, EMPHASIS, styled};
 use crate::output::{self, Output};
+use crate::terminal::{EMPHASIS, ERROR, HINT, SUCCESS, TextLayout, styled};
 use elbowroom_executive::messages::count_with_noun;
 
 /// Reads the logs and prints the learnt model.
@@ -77,7 +77,10 @@ pub(crate) fn run(arguments: &LearnArgs, output: &mut Output) -> Answer {
     })
 }
 
-fn conformal_request(arguments: &LearnArgs, output: &mut Output) -> Result<Option<ConformalRequest>, Failure> {
+fn conformal_request(
+    arguments: &LearnArgs,
+    output: &mut Output,
+) -> Result<Option<ConformalRequest>, Failure> {
     let (Some(probability), Some(domain), Some(problem), Some(plan)) = (
         &arguments.inside,
         &arguments.domain,

@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use elbowroom::network::{
-    self, Answer as Found, Durations, NetworkFile, ControllabilityCheck, Reason, Request, Simulated, Simulation,
-    Verdict,
+    self, Answer as Found, ControllabilityCheck, Durations, NetworkFile, Reason, Request,
+    Simulated, Simulation, Verdict,
 };
 use serde_json::Value;
 
@@ -14,8 +14,8 @@ use crate::args::{DurationsChoice, NetworkArgs};
 use crate::exit::{Answer, Exit, Failure};
 use crate::input;
 use crate::limits::push_wrapped;
-use crate::terminal::{ERROR, SECONDARY, SUCCESS, HINT, TextLayout, EMPHASIS, styled};
 use crate::output::{self, Output};
+use crate::terminal::{EMPHASIS, ERROR, HINT, SECONDARY, SUCCESS, TextLayout, styled};
 use elbowroom_executive::messages::count_with_noun;
 
 /// Maximum number of bounds printed of a reason; `--json` has all.
@@ -160,7 +160,11 @@ fn report(name: &str, found: &Found, look: TextLayout) -> String {
 
 /// Appends the reasons why properties do not hold. After a reason why the network is not consistent
 /// or not weakly controllable, further reasons are omitted.
-fn push_reasons(text: &mut String, promises: &[(&str, Option<&ControllabilityCheck>)], look: TextLayout) {
+fn push_reasons(
+    text: &mut String,
+    promises: &[(&str, Option<&ControllabilityCheck>)],
+    look: TextLayout,
+) {
     let mut is_explained = false;
     for (what, promise) in promises {
         let Some(promise) = promise else { continue };

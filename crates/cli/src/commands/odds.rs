@@ -12,8 +12,8 @@ use crate::args::OddsArgs;
 use crate::exit::{Answer, Exit, Failure};
 use crate::input;
 use crate::interrupt::Interrupt;
-use crate::terminal::TextLayout;
 use crate::output::{self, Output};
+use crate::terminal::TextLayout;
 use crate::time_limit::Stopwatch;
 
 /// Computes the success probability of a plan.
@@ -99,7 +99,11 @@ fn settings(arguments: &OddsArgs) -> Result<OddsSettings, Failure> {
                 Failure::new(error, "`elbowroom run --help` describes them all")
             },
         )?;
-        if let Some(odd) = settings.executors.iter().find(|spec| spec.needs_comparator()) {
+        if let Some(odd) = settings
+            .executors
+            .iter()
+            .find(|spec| spec.needs_comparator())
+        {
             return Err(Failure::new(
                 format!("`{odd}` compares plans while it executes one, which is not sampled here"),
                 "leave out the number, or use `elbowroom compare`",
@@ -115,7 +119,8 @@ fn read_likelihoods(
     task: &elbowroom::model::Task,
 ) -> Result<Arc<elbowroom::probability::Likelihoods>, Failure> {
     let read = likelihoods::read(text.clone(), task).map_err(|wrong| {
-        Failure::from(wrong).with_default_advice("docs/formats/likelihoods.md describes likelihood files")
+        Failure::from(wrong)
+            .with_default_advice("docs/formats/likelihoods.md describes likelihood files")
     })?;
     Ok(Arc::new(read))
 }

@@ -1,8 +1,8 @@
 //! `elbowroom plan`: planning with the embedded planner or another one.
 
+mod monitor;
 mod problem_input;
 mod text;
-mod monitor;
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use elbowroom::answers::plan::{
     BestPlanRequest, PlanAim, PlanFinding, PlanOutcome, PlanRequest, best_plan, plan, plan_with,
     stopped_before_reading,
 };
-use elbowroom::answers::{RequestError, Observer};
+use elbowroom::answers::{Observer, RequestError};
 use elbowroom::execute::SpecError;
 use elbowroom::external::Planner;
 use elbowroom::model::Task;
@@ -23,8 +23,8 @@ use super::threads::{self, ALL_PROCESSORS};
 use crate::args::{EMBEDDED, PlanArgs, PlanObjectiveChoice};
 use crate::exit::{Answer, Exit, Failure};
 use crate::input::ReadProblem;
-use crate::terminal::TextLayout;
 use crate::output::Output;
+use crate::terminal::TextLayout;
 use crate::{input, output};
 use monitor::PlanMonitor;
 

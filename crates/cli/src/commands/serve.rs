@@ -139,11 +139,12 @@ fn await_problem(
     loop {
         let (text, client) = router.initial_problem().wait(interrupt.stop())?.parts();
         let given = Source::new(SUBMITTED_PROBLEM, text);
-        let begun =
-            with_calendar(arguments.calendar(), &spec.domain, given, output).and_then(|(problem, at)| {
+        let begun = with_calendar(arguments.calendar(), &spec.domain, given, output).and_then(
+            |(problem, at)| {
                 spec.problem = (&problem).into();
                 Ok((checked(&arguments.run, spec, worlds, output)?, at))
-            });
+            },
+        );
         match begun {
             Ok((begun, at)) => return Some((begun, at, client)),
             Err(failure) => {
@@ -191,7 +192,9 @@ fn check_domain(domain: &NamedText) -> Result<(), Failure> {
     let nothing = Source::new("nothing", nothing);
     let (problem, _) = pddl::read_problem(&domain.source(), &nothing)?;
     match Task::new(problem).validator_only_feature() {
-        Some(feature) => Err(spec::contradiction_failure(SpecError::UnsupportedFeature(feature))),
+        Some(feature) => Err(spec::contradiction_failure(SpecError::UnsupportedFeature(
+            feature,
+        ))),
         None => Ok(()),
     }
 }

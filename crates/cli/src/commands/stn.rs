@@ -9,8 +9,8 @@ use elbowroom::plan::{ParametrizedPlan, format};
 use crate::args::StnArgs;
 use crate::exit::{Answer, Exit, Failure};
 use crate::limits::push_wrapped;
-use crate::terminal::{ERROR, TextLayout, styled};
 use crate::output::Output;
+use crate::terminal::{ERROR, TextLayout, styled};
 use crate::{input, output};
 
 /// Writes the STN plan and the other requested output.

@@ -6,7 +6,11 @@ use crate::exit::Failure;
 pub(super) const ALL_PROCESSORS: usize = 0;
 
 /// Returns the requested number of threads, or else `usual`.
-pub(super) fn thread_count(jobs: Option<usize>, usual: usize, is_embedded: bool) -> Result<usize, Failure> {
+pub(super) fn thread_count(
+    jobs: Option<usize>,
+    usual: usize,
+    is_embedded: bool,
+) -> Result<usize, Failure> {
     if jobs.is_some() && !is_embedded {
         return Err(Failure::new(
             "--jobs says how many threads the embedded planner uses; another one has its own settings",

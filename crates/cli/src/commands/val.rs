@@ -11,8 +11,8 @@ use elbowroom::num::Rational;
 
 use crate::args::ValArgs;
 use crate::exit::{Answer, Exit, Failure};
-use crate::terminal::{HINT, styled};
 use crate::output::Output;
+use crate::terminal::{HINT, styled};
 use crate::{input, output};
 
 /// Advice if the given plan is an STN plan.
@@ -66,11 +66,13 @@ pub(crate) fn run(arguments: &ValArgs, output: &mut Output) -> Answer {
         output::print(&text)?;
     }
     output::print(&tally.text())?;
-    Ok(match (tally.unreadable.is_empty(), tally.failed.is_empty()) {
-        (false, _) => Exit::BadInput,
-        (true, false) => Exit::No,
-        (true, true) => Exit::Yes,
-    })
+    Ok(
+        match (tally.unreadable.is_empty(), tally.failed.is_empty()) {
+            (false, _) => Exit::BadInput,
+            (true, false) => Exit::No,
+            (true, true) => Exit::Yes,
+        },
+    )
 }
 
 /// The results of the plans so far.

@@ -19,8 +19,8 @@ use serde_json::{Value, json};
 use crate::args::{ProblemArgs, VerifyArgs};
 use crate::exit::{Answer, Exit, Failure};
 use crate::limits::push_wrapped;
-use crate::terminal::{ERROR, SUCCESS, TextLayout, styled};
 use crate::output::{self, Output};
+use crate::terminal::{ERROR, SUCCESS, TextLayout, styled};
 use crate::{input, number};
 
 /// Checks an answer and prints the proved claims.
@@ -43,7 +43,10 @@ pub(crate) fn run(arguments: &VerifyArgs, output: &mut Output) -> Answer {
             let plan = input::any_plan(&task, plan, &RoundingRule::default(), output)?;
             let world = arguments.world.as_deref();
             let world = world.map(|path| input::world(path, &task)).transpose()?;
-            (verify_against_files(source.text(), &task, &plan, world.as_ref()), true)
+            (
+                verify_against_files(source.text(), &task, &plan, world.as_ref()),
+                true,
+            )
         }
     };
     match verdict {
@@ -51,7 +54,12 @@ pub(crate) fn run(arguments: &VerifyArgs, output: &mut Output) -> Answer {
             if arguments.json {
                 output.json(&document(Ok(&verified), is_derived))?;
             } else {
-                output::print(&proof_text(name, &verified, is_derived, TextLayout::of_stdout()))?;
+                output::print(&proof_text(
+                    name,
+                    &verified,
+                    is_derived,
+                    TextLayout::of_stdout(),
+                ))?;
             }
             Ok(Exit::Yes)
         }
@@ -64,7 +72,12 @@ pub(crate) fn run(arguments: &VerifyArgs, output: &mut Output) -> Answer {
                 output.json(&document(Err(&wrong), is_derived))?;
             } else {
                 let mut text = format!("{}: {name}\n", styled(ERROR, "not proved"));
-                push_wrapped(&mut text, &format!("{wrong}."), 2, TextLayout::of_stdout().width);
+                push_wrapped(
+                    &mut text,
+                    &format!("{wrong}."),
+                    2,
+                    TextLayout::of_stdout().width,
+                );
                 output::print(&text)?;
             }
             Ok(if wrong.is_limit() {

@@ -17,12 +17,12 @@ use serde_json::json;
 use crate::args::{ProblemArgs, WorldCheckArgs};
 use crate::exit::{Answer, Exit, Failure};
 use crate::input;
-use crate::terminal::{ERROR, SUCCESS, HINT, TextLayout, styled};
 use crate::output::{self, Output};
+use crate::terminal::{ERROR, HINT, SUCCESS, TextLayout, styled};
 use crate::wrap::wrap;
 use elbowroom_executive::messages::{escape_control, excerpt};
 use elbowroom_executive::world_protocol::{Capability, Greeting, launch};
-use protocol_driver::{WorldLost, ProtocolDriver};
+use protocol_driver::{ProtocolDriver, WorldLost};
 use restart_check::check_restart;
 use table::{Check, Findings, Outcome, Row};
 
@@ -136,7 +136,11 @@ fn script(
     Ok((task, actions))
 }
 
-fn run_actions(player: &mut ProtocolDriver, task: &Task, actions: &[(String, Rational)]) -> Result<(), WorldLost> {
+fn run_actions(
+    player: &mut ProtocolDriver,
+    task: &Task,
+    actions: &[(String, Rational)],
+) -> Result<(), WorldLost> {
     // Time must pass although no action was started.
     advance_until(player, &Rational::ONE, &Rational::ONE, |_| false)?;
     if player.can(Capability::Beliefs) {
@@ -182,7 +186,9 @@ fn run_actions(player: &mut ProtocolDriver, task: &Task, actions: &[(String, Rat
     player.findings.mark_done(Check::RunsConcurrently);
     if player.failure(1).or(player.failure(2)).is_some() {
         let why = "one of two actions that were started together was refused";
-        player.findings.record_violation(Check::RunsConcurrently, why);
+        player
+            .findings
+            .record_violation(Check::RunsConcurrently, why);
     }
     wait_for_ends(player, &[1, 2], &long, &step)?;
 
@@ -342,7 +348,10 @@ fn text(rows: &[Row], greeting: Option<&Greeting>, conforms: bool) -> String {
     let verdict = if conforms {
         styled(SUCCESS, "nothing is wrong")
     } else {
-        styled(ERROR, &format!("{wrong} of {} checks went wrong", rows.len()))
+        styled(
+            ERROR,
+            &format!("{wrong} of {} checks went wrong", rows.len()),
+        )
     };
     let _ = writeln!(text, "{verdict}");
     text

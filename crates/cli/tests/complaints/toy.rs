@@ -5,7 +5,8 @@ use std::sync::{Arc, Mutex};
 use elbowroom::execute::Execution;
 use elbowroom::execution::run::{Report, RunSettings};
 use elbowroom::execution::{
-    Cause, Command, Ending, Entry, Event, Observation, TimeAdvance, Recorder, ActionHandle, World, WorldError,
+    ActionHandle, Cause, Command, Ending, Entry, Event, Observation, Recorder, TimeAdvance, World,
+    WorldError,
 };
 use elbowroom::model::Task;
 use elbowroom::num::Rational;

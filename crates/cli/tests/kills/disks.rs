@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use super::command::root;
 use super::skipped::skipped;
-use super::{awaited, beginning, folder, check_outcome, lines, python_is_there, started};
+use super::{awaited, beginning, check_outcome, folder, lines, python_is_there, started};
 
 /// A run can be resumed from the records written before the disk was full. Nothing was started
 /// without a record.

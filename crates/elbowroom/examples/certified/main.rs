@@ -40,7 +40,9 @@ const LIMIT: Duration = Duration::from_secs(2);
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let outcome = match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
-        ["problems", folder, ref texts @ ..] => problems(Path::new(folder), texts, &mut plan_problem),
+        ["problems", folder, ref texts @ ..] => {
+            problems(Path::new(folder), texts, &mut plan_problem)
+        }
         ["changed", folder, ref texts @ ..] => {
             problems(Path::new(folder), texts, &mut changed::plan_variants)
         }

@@ -22,7 +22,13 @@ pub(crate) struct Sums {
 
 impl Sums {
     /// Counts an answer. If it says that there is no plan, certifies and checks it.
-    pub(crate) fn count_answer(&mut self, name: &str, task: &Task, situation: &Situation, answer: &Answer) {
+    pub(crate) fn count_answer(
+        &mut self,
+        name: &str,
+        task: &Task,
+        situation: &Situation,
+        answer: &Answer,
+    ) {
         let proof = match answer {
             Answer::Plan { .. } => {
                 self.plans += 1;

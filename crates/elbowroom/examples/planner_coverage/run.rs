@@ -10,11 +10,11 @@ use std::thread;
 use std::time::Duration;
 
 use elbowroom::external::{Event, Outcome, Planner, Report, Request, Settings, plan};
-use elbowroom::pipeline;
 use elbowroom::model::expression::Expression;
 use elbowroom::model::{Situation, Task};
 use elbowroom::num::Rational;
 use elbowroom::pddl::{Source, read_problem};
+use elbowroom::pipeline;
 
 use crate::manifest;
 use crate::row::{self, Row};

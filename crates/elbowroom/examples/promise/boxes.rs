@@ -6,8 +6,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use elbowroom::envelope::Guarantee;
-use elbowroom::pipeline;
 use elbowroom::num::Rational;
+use elbowroom::pipeline;
 use elbowroom::plan::{DecoupledEnvelope, ParametrizedPlan};
 
 use super::options::Options;

@@ -117,7 +117,11 @@ fn row(source: &Source, options: &Options) -> Result<Row, String> {
             Some(Objection::NoSchedule(_)) => row.no_schedule += 1,
             Some(Objection::Uncontrollable(_)) => {
                 row.uncontrollable += 1;
-                for (count, is_spoiled) in row.defeated.iter_mut().zip(defeated_executors(&ready, &grown)) {
+                for (count, is_spoiled) in row
+                    .defeated
+                    .iter_mut()
+                    .zip(defeated_executors(&ready, &grown))
+                {
                     *count += usize::from(is_spoiled);
                 }
             }

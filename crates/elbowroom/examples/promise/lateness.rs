@@ -15,7 +15,12 @@ use elbowroom::plan::{InstanceId, Node, NodeId, ParameterId, ParametrizedPlan};
 /// Returns `true` if a run ended because this action started too late and the executor could not
 /// know. It must be the only instance of its action in the plan, and its start must not have been
 /// reported. Either there was no time left, or an action failed that was overtaken.
-pub(crate) fn excuses(task: &Task, prepared: &PreparationResult, report: &Report, late: &str) -> bool {
+pub(crate) fn excuses(
+    task: &Task,
+    prepared: &PreparationResult,
+    report: &Report,
+    late: &str,
+) -> bool {
     let Some(reason) = report.reasons.first() else {
         return false;
     };

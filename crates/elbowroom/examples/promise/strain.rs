@@ -5,8 +5,8 @@
 use std::collections::{BTreeMap, VecDeque};
 
 use elbowroom::execution::{
-    Cause, Command, Decision, Ending, Entry, Event, TimeAdvance, GuaranteeLevel, Recorder, ActionHandle, World,
-    WorldError,
+    ActionHandle, Cause, Command, Decision, Ending, Entry, Event, GuaranteeLevel, Recorder,
+    TimeAdvance, World, WorldError,
 };
 use elbowroom::model::Task;
 use elbowroom::num::Rational;

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use elbowroom::pipeline;
 use elbowroom::model::{Step, Task, TimeTriggeredPlan};
 use elbowroom::pddl::{self, read_problem};
+use elbowroom::pipeline;
 use elbowroom::plan::deorder::Deordered;
 use elbowroom::plan::format;
 use elbowroom::plan::{NodeId, Valuation, network_node};

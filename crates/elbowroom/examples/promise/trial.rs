@@ -4,15 +4,16 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use elbowroom::envelope::{Guarantee, Oracle, StopReason, irr};
-use elbowroom::execute::{PlanPreparer, Execution};
+use elbowroom::execute::{Execution, PlanPreparer};
 use elbowroom::execution::run::{PlanningTime, Report, RunSettings, TimeoutRule, Verdict};
 use elbowroom::execution::{
-    DispatchableCache, PlanForm, NoPlanner, NoRecord, PrepareError, PreparationResult, Preparer, GuaranteeLevel, Recorder, World,
+    DispatchableCache, GuaranteeLevel, NoPlanner, NoRecord, PlanForm, PreparationResult,
+    PrepareError, Preparer, Recorder, World,
 };
-use elbowroom::pipeline;
 use elbowroom::model::validate::{self, validate};
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
+use elbowroom::pipeline;
 use elbowroom::plan::DecoupledEnvelope;
 use elbowroom::sim::{SimWorld, WorldModel};
 

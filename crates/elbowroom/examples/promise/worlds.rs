@@ -10,7 +10,7 @@ use elbowroom::model::Task;
 use elbowroom::num::{End, Interval, Rational};
 use elbowroom::plan::uncertain::PlanNetwork;
 use elbowroom::plan::{DecoupledEnvelope, InstanceId, ParameterId, ParameterKind};
-use elbowroom::sim::{FixedDurations, ControlledWorld, SimWorld, WorldModel};
+use elbowroom::sim::{ControlledWorld, FixedDurations, SimWorld, WorldModel};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -140,7 +140,11 @@ impl<'a> Worlds<'a> {
     }
 
     /// Returns a world with that late start; durations are drawn with this seed.
-    pub(crate) fn late<'b>(&self, late: &'b LateStart, seed: u64) -> ControlledWorld<'b, FixedDurations> {
+    pub(crate) fn late<'b>(
+        &self,
+        late: &'b LateStart,
+        seed: u64,
+    ) -> ControlledWorld<'b, FixedDurations> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let world = SimWorld::new(Arc::clone(&self.task), &late.model, 0);
         ControlledWorld::new(
@@ -185,7 +189,10 @@ impl<'a> Worlds<'a> {
 
     /// Returns the world with one late observation, and the number of that observation. Durations
     /// are drawn with this seed.
-    pub(crate) fn late_look(&self, seed: u64) -> (Lagging<ControlledWorld<'_, FixedDurations>>, u64) {
+    pub(crate) fn late_look(
+        &self,
+        seed: u64,
+    ) -> (Lagging<ControlledWorld<'_, FixedDurations>>, u64) {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let plan = &self.prepared.plan.plan;
         let looks = rng.random_range(0..=2 * plan.nodes.len() as u64);
@@ -241,7 +248,10 @@ impl<'a> Worlds<'a> {
     }
 
     /// Returns a world with durations chosen by the spoiler within the box.
-    pub(crate) fn spoiled(&self, timeout: &TimeoutRule) -> Option<ControlledWorld<'_, AdversarialWorld>> {
+    pub(crate) fn spoiled(
+        &self,
+        timeout: &TimeoutRule,
+    ) -> Option<ControlledWorld<'_, AdversarialWorld>> {
         let network = self.network.as_ref()?;
         let plan = &self.prepared.plan.plan;
         let spoiling = AdversarialWorld::new(plan, network, &self.prepared.nominal, timeout);

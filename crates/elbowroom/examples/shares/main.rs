@@ -267,7 +267,9 @@ fn best_in_steps(
 ) -> Option<BestRun> {
     let plan = Arc::new(format::read(text.as_bytes(), task).ok()?);
     let mut oracle = Oracle::new(task, &plan, guarantee).ok()?;
-    let start = irr(&mut oracle, &irr_settings(), &mut |_| ControlFlow::Continue(()));
+    let start = irr(&mut oracle, &irr_settings(), &mut |_| {
+        ControlFlow::Continue(())
+    });
     let start = start.ok()?.envelope.ok()?;
     let chances = match objective {
         Objective::Probability => duration_distributions(&plan, &default_world(task)?).ok()?,
@@ -309,7 +311,10 @@ fn irr_settings() -> Settings {
 fn shares(task: &Arc<Task>, text: &str, names: &[String], largest: &Largest) -> Option<Shares> {
     let plan = Arc::new(format::read(text.as_bytes(), task).ok()?);
     let mut oracle = Oracle::new(task, &plan, Guarantee::Dynamic).ok()?;
-    let run = irr(&mut oracle, &irr_settings(), &mut |_| ControlFlow::Continue(())).ok()?;
+    let run = irr(&mut oracle, &irr_settings(), &mut |_| {
+        ControlFlow::Continue(())
+    })
+    .ok()?;
     let found = run.envelope.ok()?;
     let nominal = DecoupledEnvelope::point(&plan.nominal());
     let Largest {

@@ -5,14 +5,14 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use elbowroom::answers::envelope::{Search, envelope};
-use elbowroom::answers::{EnvelopeRequest, StopRequest, Observer};
+use elbowroom::answers::{EnvelopeRequest, Observer, StopRequest};
 use elbowroom::envelope::{Guarantee, Objective};
 use elbowroom::model::Task;
 use elbowroom::plan::format;
 use elbowroom::verify::{AnswerError, verify_answer};
 
 use crate::instances::Instance;
-use crate::{default_world, read, best_in_steps};
+use crate::{best_in_steps, default_world, read};
 
 /// Prints a row for each family, guarantee and objective.
 #[allow(

@@ -1,19 +1,19 @@
 //! Envelopes: how far each quantity of a plan may deviate.
 
 mod answer;
-mod uniform_slack;
+mod answer_builder;
 mod best;
+mod binding_constraints;
+mod box_search;
 mod certificate;
 mod conditions;
-mod value_of_information;
-mod box_search;
 mod inequalities;
-mod binding_constraints;
 mod search;
+mod shadow_prices;
 pub mod timeline;
 mod timeouts;
-mod answer_builder;
-mod shadow_prices;
+mod uniform_slack;
+mod value_of_information;
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -28,25 +28,26 @@ use elbowroom_plan::parametrize::VarySpec;
 use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan};
 use elbowroom_sim::WorldModel;
 
-use super::{StopRequest, RequestError, Observer};
+use super::{Observer, RequestError, StopRequest};
 use crate::explain::{Explainer, Explanation};
 use crate::pipeline::{self, PipelineError};
 use crate::{AnyPlan, parse_box};
 
 pub use answer::{
-    ChosenDuration, Counterexample, EnvelopeAnswer, EnvelopeFinding, EnvelopeFormat, EnvelopeSettings,
-    NominalFailure, ActionTimes, LimitGroup, Makespans, Quantity, QuantityKind, Range, LimitedRange, Stop, WideningStep,
+    ActionTimes, ChosenDuration, Counterexample, EnvelopeAnswer, EnvelopeFinding, EnvelopeFormat,
+    EnvelopeSettings, LimitGroup, LimitedRange, Makespans, NominalFailure, Quantity, QuantityKind,
+    Range, Stop, WideningStep,
 };
-pub use uniform_slack::{UniformSlack, Deviation};
+pub(crate) use answer_builder::quantities;
 pub use best::{Best, Probability};
-pub use conditions::Conditions;
-pub use value_of_information::ValueOfInformation;
 pub(crate) use box_search::grow;
+pub use conditions::Conditions;
 pub use inequalities::{Inequalities, NetworkRow, RequirementRow};
+pub use shadow_prices::{Relax, ShadowPrices};
 pub use timeline::Timeline;
 pub(crate) use timeouts::{PlannedTimeout, unknown_action};
-pub(crate) use answer_builder::quantities;
-pub use shadow_prices::{Relax, ShadowPrices};
+pub use uniform_slack::{Deviation, UniformSlack};
+pub use value_of_information::ValueOfInformation;
 
 /// Requests the envelope of a plan, or checks whether a box lies inside it.
 #[derive(Clone, Debug)]
@@ -359,7 +360,9 @@ pub fn partial_result(
 /// # Errors
 /// When the validator rejects the plan, the request names things that the plan does not have, or
 /// the problem has processes or events.
-pub(crate) fn parametrized_plan(request: &EnvelopeRequest) -> Result<(ParametrizedPlan, usize), PipelineError> {
+pub(crate) fn parametrized_plan(
+    request: &EnvelopeRequest,
+) -> Result<(ParametrizedPlan, usize), PipelineError> {
     match request.task.unsupported_by_analysis() {
         Some(feature) => Err(DeorderError::Unsupported { feature }.into()),
         None => parametrized_plan_with_autonomous(request),
@@ -367,7 +370,9 @@ pub(crate) fn parametrized_plan(request: &EnvelopeRequest) -> Result<(Parametriz
 }
 
 /// Like [`opened`], but also for problems with processes and events.
-fn parametrized_plan_with_autonomous(request: &EnvelopeRequest) -> Result<(ParametrizedPlan, usize), PipelineError> {
+fn parametrized_plan_with_autonomous(
+    request: &EnvelopeRequest,
+) -> Result<(ParametrizedPlan, usize), PipelineError> {
     let task = &request.task;
     let plan = match &request.plan {
         AnyPlan::Stn(plan) => pipeline::open_more_quantities(task, plan.clone(), &request.vary)?,
@@ -387,7 +392,9 @@ fn contains(
     text: &str,
 ) -> Result<EnvelopeOutcome, RequestError> {
     let envelope = parse_box(text, subject.plan)?;
-    let objection = oracle.objection(&envelope).map_err(PipelineError::Refused)?;
+    let objection = oracle
+        .objection(&envelope)
+        .map_err(PipelineError::Refused)?;
     let parameters = subject.ranges(&envelope);
     let Some(objection) = objection else {
         let finding = match subject.possible_timeout(&envelope) {
@@ -431,7 +438,11 @@ impl Subject<'_> {
 
     /// Rejects an objection that is no proof of failure: processes and events would take another
     /// course than in the plan, which may be harmless.
-    fn reject_unproved_objection(&self, place: &str, why_not: &Explanation) -> Result<(), PipelineError> {
+    fn reject_unproved_objection(
+        &self,
+        place: &str,
+        why_not: &Explanation,
+    ) -> Result<(), PipelineError> {
         if !why_not.may_be_harmless(&self.request.task) {
             return Ok(());
         }

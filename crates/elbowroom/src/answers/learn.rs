@@ -2,8 +2,8 @@
 //! plan's envelope.
 
 mod changes;
-mod fact_history;
 mod conformal_box;
+mod fact_history;
 mod known_sections;
 mod prediction;
 mod timeouts;
@@ -17,15 +17,15 @@ use elbowroom_sim::{Distribution, FailureTime, WorldModel};
 use elbowroom_text::{Diagnostics, Source};
 use serde::{Deserialize, Serialize};
 
-use super::{RequestError, Version, Observer};
+use super::{Observer, RequestError, Version};
 
 use changes::ExpectedChanges;
 use prediction::Predictions;
 
 pub use changes::{LearntChanges, LearntRate};
-pub use fact_history::FactHistory;
-pub use elbowroom_learning::learn::Settings;
 pub use conformal_box::{ConformalBox, ConformalInterval, ConformalRequest, Verdict};
+pub use elbowroom_learning::learn::Settings;
+pub use fact_history::FactHistory;
 pub use known_sections::known_sections;
 pub use prediction::{PredictionAnswer, predictions_for};
 
@@ -94,7 +94,9 @@ impl Log {
                 Ok(Self {
                     name,
                     records: records::of_trace(&trace),
-                    world: course.as_ref().and_then(|course| course.believed_world(&trace)),
+                    world: course
+                        .as_ref()
+                        .and_then(|course| course.believed_world(&trace)),
                     fact_history: course,
                 })
             }
@@ -270,7 +272,10 @@ pub fn learn(
         .flat_map(|log| log.records.iter().cloned())
         .collect();
     let mut learnt = learn::learn(&records, &request.settings);
-    let courses = request.logs.iter().filter_map(|log| log.fact_history.as_ref());
+    let courses = request
+        .logs
+        .iter()
+        .filter_map(|log| log.fact_history.as_ref());
     for (name, is_undone) in courses.flat_map(FactHistory::undone_effects) {
         if let Some(of_name) = learnt.iter_mut().find(|it| it.name == name) {
             of_name.undone.add(is_undone);

@@ -15,13 +15,13 @@ use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan};
 use elbowroom_plan::NodeId;
 use elbowroom_plan::partial_order::partial_order;
 use elbowroom_probability::{
-    SearchState, Likelihoods, Model, OrderSearch, SearchSettings, SearchStop, Semantics,
+    Likelihoods, Model, OrderSearch, SearchSettings, SearchState, SearchStop, Semantics,
     TotalOrderPlan,
 };
 use elbowroom_sim::WorldModel;
 use serde::{Deserialize, Serialize};
 
-use super::{RequestError, Version, ViolationAnswer, Observer};
+use super::{Observer, RequestError, Version, ViolationAnswer};
 use crate::execute::Embedded;
 use crate::execute::with_fixed_durations;
 
@@ -255,7 +255,11 @@ fn finding(
         let order = subject
             .search
             .order_of(&subject.initial, &subject.as_planned);
-        OrderAnswer::of(&subject, &order.map_err(|error| coupling_error(&error))?, None)?
+        OrderAnswer::of(
+            &subject,
+            &order.map_err(|error| coupling_error(&error))?,
+            None,
+        )?
     };
     if order.probability <= 0.0 && !is_executable_in_order(request, plan)? {
         return Ok(no_order_finding());

@@ -2,8 +2,8 @@
 
 mod external;
 mod improving;
-mod objective;
 mod no_plan_claim;
+mod objective;
 
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -14,7 +14,7 @@ use elbowroom_planner::{Answer, Counts, FoundPlan, Progress, Settings, Stopped};
 use elbowroom_verify::no_plan::NoPlan;
 use serde::{Deserialize, Serialize};
 
-use super::{Event, Exact, StopRequest, PlanProgress, RequestError, Version, Observer, exact};
+use super::{Event, Exact, Observer, PlanProgress, RequestError, StopRequest, Version, exact};
 use crate::execute::exhausted;
 use crate::plan_text;
 
@@ -425,7 +425,9 @@ impl SearchMonitor<'_> {
 
     fn stop(&self, stopped: Stopped) -> PlanStop {
         match stopped {
-            Stopped::Interrupted => self.stop_request.map_or(PlanStop::Cancelled, PlanStop::from),
+            Stopped::Interrupted => self
+                .stop_request
+                .map_or(PlanStop::Cancelled, PlanStop::from),
             Stopped::OutOfMemory => PlanStop::MemoryLimit,
             Stopped::FirstPlan => PlanStop::FirstPlan,
             Stopped::Exhausted => PlanStop::Exhausted,

@@ -15,10 +15,10 @@ use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
 use super::envelope::{self, Inequalities, Quantity, Timeline, quantities};
-use super::{EnvelopeRequest, Exact, RequestError, Version, ViolationAnswer, Observer, exact};
+use super::{EnvelopeRequest, Exact, Observer, RequestError, Version, ViolationAnswer, exact};
 use crate::explain::Explainer;
-use crate::pipeline::PipelineError;
 use crate::linear_form::LinearForm;
+use crate::pipeline::PipelineError;
 
 pub use boxes::{BoxAnswer, IntervalAnswer};
 pub use measure::{Measure, Share};
@@ -289,7 +289,11 @@ fn row_answer(explainer: &Explainer<'_>, form: &LinearForm, row: &RegionRow) -> 
 }
 
 /// Describes a row about durations: which actions have to fit into which others.
-fn describe_duration_row(explainer: &Explainer<'_>, row: &RegionRow, bounds: &[(usize, Side)]) -> Option<String> {
+fn describe_duration_row(
+    explainer: &Explainer<'_>,
+    row: &RegionRow,
+    bounds: &[(usize, Side)],
+) -> Option<String> {
     let (mut takes, mut gives) = (Vec::new(), Vec::new());
     for (id, factor) in &row.factors {
         let ParameterKind::Duration(instance) = explainer.plan.parameter(*id).kind else {

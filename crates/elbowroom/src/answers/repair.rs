@@ -1,14 +1,14 @@
 //! Repairs: the cheapest changes that make a plan work.
 
-mod subject;
 mod descriptions;
+mod subject;
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use elbowroom_envelope::obligations::Refusal;
 use elbowroom_envelope::{
-    Guarantee, Oracle, Repair, RepairLimits, RepairRun, with_obligations, repair as cheapest,
+    Guarantee, Oracle, Repair, RepairLimits, RepairRun, repair as cheapest, with_obligations,
 };
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::{Interval, Rational};
@@ -17,7 +17,7 @@ use elbowroom_plan::{Constraint, DecoupledEnvelope, ParametrizedPlan, Schedule, 
 use serde::{Deserialize, Serialize};
 
 use super::plan::PlanStep;
-use super::{Exact, StopRequest, RequestError, Version, Observer, exact};
+use super::{Exact, Observer, RequestError, StopRequest, Version, exact};
 use crate::pipeline::{self, PipelineError};
 use crate::{AnyPlan, pinning};
 use subject::Subject;
@@ -297,7 +297,11 @@ struct RepairGuarantee {
 }
 
 /// Deorders the plan, and checks its guarantee at the nominal values.
-fn check_guarantee(request: &RepairRequest, task: &Task, plan: &TimeTriggeredPlan) -> RepairGuarantee {
+fn check_guarantee(
+    request: &RepairRequest,
+    task: &Task,
+    plan: &TimeTriggeredPlan,
+) -> RepairGuarantee {
     let task = Arc::new(task.clone());
     let opened = pipeline::free(&task, plan).and_then(|freed| pipeline::open(&task, freed, &[]));
     let why_not = match opened {
@@ -415,7 +419,12 @@ impl Subject {
 
     /// Checks the guarantee of an STN plan with these values, and finds the additional bounds that
     /// it needs.
-    fn check_network_guarantee(&self, request: &RepairRequest, values: &Valuation, schedule: &Schedule) -> RepairGuarantee {
+    fn check_network_guarantee(
+        &self,
+        request: &RepairRequest,
+        values: &Valuation,
+        schedule: &Schedule,
+    ) -> RepairGuarantee {
         let mut plan = self.plan.clone();
         let own = plan.parameters.iter_mut().zip(values).enumerate();
         for (index, (parameter, value)) in own {
@@ -426,8 +435,9 @@ impl Subject {
             }
         }
         let task = Arc::new(self.task.clone());
-        let objected =
-            |plan: &ParametrizedPlan| nominal_objection(&task, &Arc::new(plan.clone()), request.guarantee);
+        let objected = |plan: &ParametrizedPlan| {
+            nominal_objection(&task, &Arc::new(plan.clone()), request.guarantee)
+        };
         let Some(why_not) = objected(&plan) else {
             return RepairGuarantee::default();
         };

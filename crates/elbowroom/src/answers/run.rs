@@ -4,13 +4,13 @@ use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use elbowroom_execution::run::{Report, RunSnapshot, Verdict};
-use elbowroom_execution::{Entry, NoRecord, Planner, Preparer, BeliefState, Recorder, World};
+use elbowroom_execution::{BeliefState, Entry, NoRecord, Planner, Preparer, Recorder, World};
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 use elbowroom_report::trace::schema::ReportLine;
 use serde::{Deserialize, Serialize};
 
-use super::{Event, Version, Observer};
+use super::{Event, Observer, Version};
 use crate::execute::{Listener, RunSpec, SpecError, Validated};
 
 /// Requests a run.
@@ -113,7 +113,10 @@ impl<'a> RunRequest<'a> {
     #[must_use]
     pub fn resume_from(self, stand: impl Into<Option<RunSnapshot>>) -> Self {
         let stand = stand.into();
-        Self { snapshot: stand, ..self }
+        Self {
+            snapshot: stand,
+            ..self
+        }
     }
 
     /// Sets the number of times that the run was continued after its end.
@@ -216,7 +219,11 @@ pub fn run(
         answer: RunAnswer {
             first_plan,
             no_table,
-            invalid: validation.findings().iter().map(ToString::to_string).collect(),
+            invalid: validation
+                .findings()
+                .iter()
+                .map(ToString::to_string)
+                .collect(),
             ..RunAnswer::of(&report)
         },
         report,

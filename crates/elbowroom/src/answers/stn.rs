@@ -9,8 +9,8 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::{RequestError, Version, ViolationAnswer, exact};
 use crate::AnyPlan;
-use crate::pipeline::{self, PipelineError};
 use crate::dot;
+use crate::pipeline::{self, PipelineError};
 
 /// Requests a plan with only the orderings and bounds that it needs.
 #[derive(Clone, Debug)]

@@ -7,7 +7,7 @@ use elbowroom_execution::run::TimeoutRule;
 use elbowroom_num::Rational;
 use elbowroom_plan::uncertain::PlanNetwork;
 use elbowroom_plan::{InstanceId, Node, NodeId, Schedule, StnPlan, network_node};
-use elbowroom_sim::{StartedAction, DurationController};
+use elbowroom_sim::{DurationController, StartedAction};
 use elbowroom_stn::NodeId as NetworkNode;
 use elbowroom_stn::uncertain::{Adversary, UncertainNetwork};
 

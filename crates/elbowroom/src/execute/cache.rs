@@ -9,7 +9,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
 
 use elbowroom_execution::{
-    PlanForm, PlanAnswer, Planner, PlannerAnswer, PrepareError, PreparationResult, Preparer,
+    PlanAnswer, PlanForm, Planner, PlannerAnswer, PreparationResult, PrepareError, Preparer,
 };
 use elbowroom_model::{Situation, State, Task, TimeTriggeredPlan, TimedHappening};
 use elbowroom_num::Rational;
@@ -45,7 +45,10 @@ impl<Q, A: Clone> Cache<Q, A> {
             self.count = 0;
         }
         self.count += 1;
-        self.entries.entry(hash).or_default().push((question, answer));
+        self.entries
+            .entry(hash)
+            .or_default()
+            .push((question, answer));
     }
 }
 

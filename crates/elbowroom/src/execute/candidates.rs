@@ -217,7 +217,9 @@ impl<'a> Candidates<'a> {
         } else {
             let first = self.first_states.unwrap_or_default();
             let left = (self.limits.other_states + first).saturating_sub(self.states);
-            let most = LEAST_STATES.max(VARIANT_STATES_FACTOR.saturating_mul(first)).min(left);
+            let most = LEAST_STATES
+                .max(VARIANT_STATES_FACTOR.saturating_mul(first))
+                .min(left);
             if variant.scarcity.is_some() {
                 // The first plan found may compensate small amounts in a wasteful way; a better one
                 // does so in time.
@@ -339,7 +341,11 @@ impl<'a> Candidates<'a> {
 
     /// Converts a plan of a variant to the task: with the domain's durations, and as early as
     /// possible. `None` if the validator rejects it.
-    fn to_task_plan(&self, variant: &Variant, plan: &TimeTriggeredPlan) -> Option<TimeTriggeredPlan> {
+    fn to_task_plan(
+        &self,
+        variant: &Variant,
+        plan: &TimeTriggeredPlan,
+    ) -> Option<TimeTriggeredPlan> {
         if variant.needs_no_conversion() {
             return Some(plan.clone());
         }

@@ -2,18 +2,20 @@
 
 use std::sync::Arc;
 
-use elbowroom_execution::executors::{ExecutorSpec, PolicyTableCache, ExecutorServices, UnknownExecutor};
+use elbowroom_execution::executors::{
+    ExecutorServices, ExecutorSpec, PolicyTableCache, UnknownExecutor,
+};
 use elbowroom_execution::run::{Ports, Report, Run, RunSettings, RunSnapshot};
 use elbowroom_execution::{
-    Executor, NoRecord, PlanComparator, ActionValues, Planner, PortWorkers, Preparer, BeliefState, Recorder,
-    RolloutEvaluator, Workers, World,
+    ActionValues, BeliefState, Executor, NoRecord, PlanComparator, Planner, PortWorkers, Preparer,
+    Recorder, RolloutEvaluator, Workers, World,
 };
 use elbowroom_model::problem::Condition;
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_pddl::{Diagnostics, Source};
 use elbowroom_probability::Likelihoods;
 
-use super::{PlanPreparer, Embedded, SharedRolloutPolicy, ExactRegion};
+use super::{Embedded, ExactRegion, PlanPreparer, SharedRolloutPolicy};
 use crate::pipeline;
 
 /// Reads a goal in PDDL for a running execution of this task: the condition alone, without `:goal`.
@@ -176,7 +178,10 @@ impl<'a> Execution<'a> {
     /// Resumes an executive's run from this state: see [`Run::standing`].
     pub fn resume_from(self, stand: impl Into<Option<RunSnapshot>>) -> Self {
         let stand = stand.into();
-        Self { snapshot: stand, ..self }
+        Self {
+            snapshot: stand,
+            ..self
+        }
     }
 
     /// Sets the number of times that the run was continued after its end: see [`Run::reopened`].
@@ -224,17 +229,26 @@ impl<'a> Execution<'a> {
 
     /// Sets the odds, for executors that search for likelier plans ([`ExecutorSpec::asks_odds`]).
     pub fn with_plan_comparator(self, odds: Option<Box<dyn PlanComparator>>) -> Self {
-        Self { plan_comparator: odds, ..self }
+        Self {
+            plan_comparator: odds,
+            ..self
+        }
     }
 
     /// Sets the outlook, for executors that evaluate each move ([`ExecutorSpec::asks_outlook`]).
     pub fn with_action_values(self, outlook: Option<Arc<dyn ActionValues>>) -> Self {
-        Self { action_values: outlook, ..self }
+        Self {
+            action_values: outlook,
+            ..self
+        }
     }
 
     /// Records the reason for a missing outlook of an executor that evaluates each move.
     pub(crate) fn with_missing_table_reason(self, no_table: Option<String>) -> Self {
-        Self { missing_table_reason: no_table, ..self }
+        Self {
+            missing_table_reason: no_table,
+            ..self
+        }
     }
 
     /// Returns why there is no table of moves for an executor that evaluates each move; `None` if
@@ -245,7 +259,10 @@ impl<'a> Execution<'a> {
 
     /// Sets the rollouts, for executors that evaluate each move without an outlook.
     pub fn with_rollouts(self, rehearsal: Option<SharedRolloutPolicy>) -> Self {
-        Self { rollouts: rehearsal, ..self }
+        Self {
+            rollouts: rehearsal,
+            ..self
+        }
     }
 
     /// Sets the planner. The default is the embedded one with its usual limits
@@ -270,7 +287,10 @@ impl<'a> Execution<'a> {
     /// See [`Run::ending_when`].
     pub fn with_stop_check(self, is_to_end: impl Fn() -> bool + Send + 'a) -> Self {
         let is_to_end = Box::new(is_to_end);
-        Self { stop_check: is_to_end, ..self }
+        Self {
+            stop_check: is_to_end,
+            ..self
+        }
     }
 
     /// See [`Run::explaining`].
@@ -284,7 +304,10 @@ impl<'a> Execution<'a> {
     /// Makes the run persistent: it continues after reaching the goal, and accepts further goals in
     /// PDDL. See [`Run::lasting`].
     pub fn persistent(self, is_lasting: bool) -> Self {
-        Self { is_persistent: is_lasting, ..self }
+        Self {
+            is_persistent: is_lasting,
+            ..self
+        }
     }
 
     /// Makes the run accept pauses and the abandonment of its goal: see [`Run::attended`].

@@ -6,7 +6,9 @@ use std::sync::Arc;
 
 use elbowroom_envelope::obligations::Refusal;
 use elbowroom_envelope::{Guarantee, Oracle, Settings as SearchSettings, irr};
-use elbowroom_execution::{DispatchableCache, PlanForm, PrepareError, PreparationResult, Preparer, RegionOracle};
+use elbowroom_execution::{
+    DispatchableCache, PlanForm, PreparationResult, PrepareError, Preparer, RegionOracle,
+};
 use elbowroom_model::ground::Action;
 use elbowroom_model::validate::Verdict;
 use elbowroom_model::{Task, TimeTriggeredPlan};
@@ -20,8 +22,8 @@ use elbowroom_plan::{
 };
 use elbowroom_stn::ConsistentNetwork;
 
-use super::propositional::{with_fixed_durations, to_propositional};
 use super::open_durations;
+use super::propositional::{to_propositional, with_fixed_durations};
 use super::vary::is_about_an_absent_action;
 use crate::answers::envelope::{PlannedTimeout, grow};
 use crate::pipeline::{self, PipelineError};
@@ -71,7 +73,10 @@ impl PlanPreparer {
     /// `limit` is called after each step. The box is sound at any time, but may be smaller than
     /// possible.
     #[must_use]
-    pub fn with_limit(mut self, limit: impl Fn() -> ControlFlow<()> + Send + Sync + 'static) -> Self {
+    pub fn with_limit(
+        mut self,
+        limit: impl Fn() -> ControlFlow<()> + Send + Sync + 'static,
+    ) -> Self {
         self.limit = Some(Arc::new(limit));
         self
     }
@@ -115,7 +120,8 @@ impl PlanPreparer {
         need: PlanForm,
     ) -> Result<PreparationResult, PrepareError> {
         let mut deordered = deorder::deorder(task, &to_propositional(task, plan))?;
-        let order = (need == PlanForm::PartialOrder).then(|| partial_order(task, &with_fixed_durations(plan)));
+        let order = (need == PlanForm::PartialOrder)
+            .then(|| partial_order(task, &with_fixed_durations(plan)));
         for (instance, step) in deordered.instances.iter().zip(&plan.steps) {
             deordered.plan.instances[instance.index()].action = step.action.clone();
         }
@@ -172,7 +178,9 @@ impl Preparer for PlanPreparer {
         let instances = freed.instances.clone();
         let given = freed.plan.clone();
         let plan = Arc::new(match need {
-            PlanForm::Orderings | PlanForm::PartialOrder | PlanForm::Network => pipeline::without_parameters(task, freed),
+            PlanForm::Orderings | PlanForm::PartialOrder | PlanForm::Network => {
+                pipeline::without_parameters(task, freed)
+            }
             PlanForm::OpenNetwork | PlanForm::Envelope => self.open(task, freed)?,
         });
         if matches!(need, PlanForm::OpenNetwork | PlanForm::Envelope)

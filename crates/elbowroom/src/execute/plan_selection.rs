@@ -11,15 +11,15 @@ use elbowroom_num::{Rational, work};
 use elbowroom_plan::partial_order::partial_order;
 use elbowroom_planner::embedded;
 use elbowroom_probability::{
-    SearchState, Likelihoods, Model, OrderSearch, SearchSettings, Semantics,
+    Likelihoods, Model, OrderSearch, SearchSettings, SearchState, Semantics,
 };
 use serde::{Deserialize, Serialize};
 
-use super::with_fixed_durations;
 use super::candidates::{Candidate, Candidates, Limits};
 use super::planners::{CERTIFICATE_WORK, FIRST_PLAN_FACTOR, without_plan};
 use super::race::{Rules, race};
-use super::rollouts::{Rollouts, RolloutSession};
+use super::rollouts::{RolloutSession, Rollouts};
+use super::with_fixed_durations;
 
 /// Maximum number of compared plans.
 const MOST_PLANS: usize = 12;
@@ -266,7 +266,12 @@ impl PlanSelector<'_> {
         source: &mut Candidates<'_>,
         plans: &mut Vec<Candidate>,
     ) -> (Vec<Value>, usize) {
-        let mut tryout = RolloutSession::new(task, rollouts.clone(), budget.remaining(), self.may_continue);
+        let mut tryout = RolloutSession::new(
+            task,
+            rollouts.clone(),
+            budget.remaining(),
+            self.may_continue,
+        );
         let mut first = Vec::new();
         let mut left = MOST_ACTIONS;
         let mut afford = |plan: &Candidate, floor: u64| {

@@ -74,7 +74,11 @@ impl Default for Embedded<'_> {
 
 impl Embedded<'_> {
     /// Returns the answer, and the number of evaluated states.
-    pub(crate) fn plan_with_state_count(&self, task: &Task, situation: &Situation) -> (PlanAnswer, u64) {
+    pub(crate) fn plan_with_state_count(
+        &self,
+        task: &Task,
+        situation: &Situation,
+    ) -> (PlanAnswer, u64) {
         let mut states = 0;
         let answer = self.answer(task, situation, &mut states);
         (answer, states)

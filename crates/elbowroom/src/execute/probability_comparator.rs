@@ -4,7 +4,9 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use elbowroom_execution::{SuccessRates, PlanComparator, PlanAnswer, Planner, PlannerAnswer, RemainingPlan};
+use elbowroom_execution::{
+    PlanAnswer, PlanComparator, Planner, PlannerAnswer, RemainingPlan, SuccessRates,
+};
 use elbowroom_model::ground::{Action, Expression};
 use elbowroom_model::problem::{Comparison, SchemaId};
 use elbowroom_model::validate::{self, validate_from};
@@ -89,7 +91,10 @@ impl PlanComparator for MostProbablePlanner<'_> {
         // Planning must not add facts to the task's own table.
         let task = rest.belief.task().with_own_table();
         let (_, other) = self.best(&task, &situation).ok()?;
-        Some(SuccessRates { remaining_plan: present, other_plan: other })
+        Some(SuccessRates {
+            remaining_plan: present,
+            other_plan: other,
+        })
     }
 }
 
@@ -314,7 +319,10 @@ impl RemainingNetwork {
             }
         }
         let plan = plan.remainder(now, |node| happened[node.index()].as_ref(), |_| true);
-        Self { plan, future_durations: to_come }
+        Self {
+            plan,
+            future_durations: to_come,
+        }
     }
 
     /// Returns `true` if the plan works in one of the sampled worlds.

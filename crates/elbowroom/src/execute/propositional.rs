@@ -102,7 +102,8 @@ fn collect_guard_fluents(task: &Task, guard: &Guard, read: &mut BTreeSet<FluentI
 /// Returns the action with its comparisons assumed true.
 fn without_conditions(action: &Action) -> Action {
     let mut action = action.clone();
-    let without = |snap: &mut SnapAction| snap.condition = assume_comparisons(&snap.condition, true);
+    let without =
+        |snap: &mut SnapAction| snap.condition = assume_comparisons(&snap.condition, true);
     match &mut action.body {
         Body::Instantaneous(snap) => without(snap),
         Body::Durative(body) => {
@@ -130,10 +131,18 @@ fn assume_comparisons(condition: &Condition, truth: bool) -> Condition {
         Condition::Compare(..) if truth => Condition::TRUE,
         Condition::Compare(..) => Condition::FALSE,
         Condition::Not(part) => Condition::Not(Box::new(assume_comparisons(part, !truth))),
-        Condition::And(parts) => {
-            Condition::And(parts.iter().map(|it| assume_comparisons(it, truth)).collect())
-        }
-        Condition::Or(parts) => Condition::Or(parts.iter().map(|it| assume_comparisons(it, truth)).collect()),
+        Condition::And(parts) => Condition::And(
+            parts
+                .iter()
+                .map(|it| assume_comparisons(it, truth))
+                .collect(),
+        ),
+        Condition::Or(parts) => Condition::Or(
+            parts
+                .iter()
+                .map(|it| assume_comparisons(it, truth))
+                .collect(),
+        ),
     }
 }
 

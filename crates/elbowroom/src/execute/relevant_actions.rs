@@ -9,7 +9,7 @@ use elbowroom_num::Rational;
 use elbowroom_sim::WorldModel;
 use indexmap::IndexMap;
 
-use super::{Candidates, Embedded, Limits, Replanning, Rollouts, RolloutSession};
+use super::{Candidates, Embedded, Limits, Replanning, RolloutSession, Rollouts};
 use crate::pipeline;
 use crate::timed::{self, Settings};
 

@@ -5,12 +5,13 @@ mod sample_set;
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use elbowroom_execution::executors::{ExecutorSpec, ExecutorServices, OrderCache};
+use elbowroom_execution::executors::{ExecutorServices, ExecutorSpec, OrderCache};
 use elbowroom_execution::run::PlanningTime;
 use elbowroom_execution::run::situation::{OverrunEstimate, remaining_plan_of, situation_at};
 use elbowroom_execution::{
-    Ending, Executor, PreparedPlan, PlanEvent, PlanAnswer, Planner, PlannerAnswer, RolloutEvaluator, RolloutResult,
-    RolloutChoice, DecisionPoint, Informativeness, PreparationRequest,
+    DecisionPoint, Ending, Executor, Informativeness, PlanAnswer, PlanEvent, Planner,
+    PlannerAnswer, PreparationRequest, PreparedPlan, RolloutChoice, RolloutEvaluator,
+    RolloutResult,
 };
 use elbowroom_model::ground::{Condition, FactId};
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
@@ -22,7 +23,7 @@ use super::race::{Rules, Tally, is_behind, race};
 use super::rollouts::Rollouts;
 use crate::pipeline;
 
-use super::{PlanPreparer, Candidates, Embedded, Limits, CachingPreparer, ExactRegion};
+use super::{CachingPreparer, Candidates, Embedded, ExactRegion, Limits, PlanPreparer};
 use sample_set::SampleSet;
 
 /// Executors that may adopt a new plan instead of `live`.
@@ -229,7 +230,10 @@ impl RolloutEvaluator for RolloutPolicy {
         let is_beginning = scene.is_plan_new && scene.belief.time().is_zero();
         let steps = scene.remaining_steps.to_vec();
         let plan = TimeTriggeredPlan { steps };
-        let known = self.initial_results.iter().find(|(known, _)| *known == plan);
+        let known = self
+            .initial_results
+            .iter()
+            .find(|(known, _)| *known == plan);
         if let Some((_, choice)) = known.filter(|_| is_beginning) {
             let choice = choice.clone();
             return self.result_of(ways, &choice);
@@ -315,7 +319,11 @@ impl RolloutPolicy {
         }
     }
 
-    fn build_executor(&self, executor: &ExecutorSpec, orders: Option<OrderCache>) -> Box<dyn Executor> {
+    fn build_executor(
+        &self,
+        executor: &ExecutorSpec,
+        orders: Option<OrderCache>,
+    ) -> Box<dyn Executor> {
         executor.build(ExecutorServices {
             order_cache: orders,
             likelihoods: Arc::clone(&self.rollouts.likelihoods),
@@ -332,7 +340,11 @@ impl RolloutPolicy {
         let (situation, running) = if begins {
             (Situation::initial(task), Vec::new())
         } else {
-            situation_at(scene.belief, now + task.epsilon(), OverrunEstimate::QuarterLonger)
+            situation_at(
+                scene.belief,
+                now + task.epsilon(),
+                OverrunEstimate::QuarterLonger,
+            )
         };
         let Some(rest) = remaining_plan_of(task, &situation, scene.remaining_steps.to_vec()) else {
             return ways;
@@ -362,7 +374,11 @@ impl RolloutPolicy {
     }
 
     /// Adds the alternatives of replanning and waiting.
-    fn add_replanning_and_waiting(&mut self, scene: &DecisionPoint<'_>, ways: &mut Vec<Alternative>) {
+    fn add_replanning_and_waiting(
+        &mut self,
+        scene: &DecisionPoint<'_>,
+        ways: &mut Vec<Alternative>,
+    ) {
         if scene.is_plan_new {
             return;
         }
@@ -404,7 +420,11 @@ impl RolloutPolicy {
         plans.take(MOST_PLANS).map(|it| it.plan).collect()
     }
 
-    fn choose(&mut self, scene: &DecisionPoint<'_>, mut ways: Vec<Alternative>) -> (Vec<Alternative>, Choice) {
+    fn choose(
+        &mut self,
+        scene: &DecisionPoint<'_>,
+        mut ways: Vec<Alternative>,
+    ) -> (Vec<Alternative>, Choice) {
         let budget = work::Budget::new(self.planner.work);
         let mut stage = SampleSet::new(scene, &self.rollouts);
         let mut first = Vec::new();
@@ -460,7 +480,8 @@ impl RolloutPolicy {
             // new samples.
             tallies[0].is_behind(&tallies[leader]) && {
                 let mut again = |way: &Alternative| {
-                    let mut samples = FIRST_CONFIRMATION_SAMPLE..FIRST_CONFIRMATION_SAMPLE + ROUNDS[ROUNDS.len() - 1];
+                    let mut samples = FIRST_CONFIRMATION_SAMPLE
+                        ..FIRST_CONFIRMATION_SAMPLE + ROUNDS[ROUNDS.len() - 1];
                     samples.try_fold(Vec::new(), |mut results, sample| {
                         results.push(stage.succeeds(self, scene, way, sample));
                         (!budget.is_spent()).then_some(results)

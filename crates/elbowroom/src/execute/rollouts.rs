@@ -13,7 +13,7 @@ use elbowroom_probability::Likelihoods;
 use elbowroom_sim::WorldModel;
 
 use super::plan_selection::renumbered;
-use super::{PlanPreparer, Embedded, Execution, CachingPlanner, CachingPreparer};
+use super::{CachingPlanner, CachingPreparer, Embedded, Execution, PlanPreparer};
 use crate::pipeline;
 
 /// First seed of the samples, far from seeds that users choose.

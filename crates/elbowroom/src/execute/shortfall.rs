@@ -34,11 +34,18 @@ impl Embedded<'_> {
             return (answer, shortfall);
         }
         shortfall.missed_deadlines = self.missed_deadlines(task, situation);
-        if shortfall.missed_deadlines.iter().any(|late| late.proven_lower_bound.is_some()) {
+        if shortfall
+            .missed_deadlines
+            .iter()
+            .any(|late| late.proven_lower_bound.is_some())
+        {
             return (PlanAnswer::Unsolvable, shortfall);
         }
         if answer == PlanAnswer::Unsolvable {
-            let (from, work) = (with_any_ends(situation), self.certificate_work / LIMIT_DIVISOR);
+            let (from, work) = (
+                with_any_ends(situation),
+                self.certificate_work / LIMIT_DIVISOR,
+            );
             shortfall.conflict = conflict(task, &from, work, &mut || self.may_continue());
         }
         (answer, shortfall)
@@ -87,7 +94,8 @@ impl Embedded<'_> {
             objective: Objective::Makespan,
             ..self.settings.clone()
         };
-        let (most_states, most_work) = (self.most_states / LIMIT_DIVISOR, self.work / LIMIT_DIVISOR);
+        let (most_states, most_work) =
+            (self.most_states / LIMIT_DIVISOR, self.work / LIMIT_DIVISOR);
         let answer = embedded::plan(&relaxed, situation, &settings, &mut |progress| {
             let counts = &progress.counts;
             let limit = match progress.best {

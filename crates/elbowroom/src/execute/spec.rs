@@ -1,7 +1,7 @@
 //! Specification of a run as data: [`RunSpec`].
 
-mod text_form;
 mod assembly;
+mod text_form;
 
 use std::sync::Arc;
 
@@ -22,7 +22,7 @@ use crate::pipeline;
 pub(crate) use text_form::{as_text, listed};
 use text_form::{positive, required};
 
-pub use assembly::{FirstPlanError, SpecError, AdversaryError};
+pub use assembly::{AdversaryError, FirstPlanError, SpecError};
 
 /// Name for a run without a planner.
 pub const NO_PLANNER: &str = "none";

@@ -8,8 +8,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use elbowroom_execution::run::{PROBLEM_GOAL_NAME, TimeoutRule, Verdict};
 use elbowroom_execution::{
-    Cause, Command, Decided, Decision, Doubt, Entry, Event, GoalTerms, PreparedPlan, Observation,
-    BeliefState, GuaranteeLevel, Request, StepId, ActionHandle, WarningCause,
+    ActionHandle, BeliefState, Cause, Command, Decided, Decision, Doubt, Entry, Event, GoalTerms,
+    GuaranteeLevel, Observation, PreparedPlan, Request, StepId, WarningCause,
 };
 use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_model::{Situation, Task};
@@ -66,7 +66,11 @@ impl Status {
         let mut goals = GoalList::default();
         if !task.problem().goal.is_trivial() {
             let goal = goal_text(task);
-            goals.add((PROBLEM_GOAL_NAME, &goal), &GoalTerms::default(), &Rational::ZERO);
+            goals.add(
+                (PROBLEM_GOAL_NAME, &goal),
+                &GoalTerms::default(),
+                &Rational::ZERO,
+            );
         }
         let known = StatusData {
             timeout,
@@ -401,7 +405,8 @@ impl StatusData {
                     }
                     Some(verdict) => {
                         let is_certain = **verdict == Verdict::Unsolvable;
-                        self.goals.mark_unplanned(is_certain, &reasons.join("; "), now);
+                        self.goals
+                            .mark_unplanned(is_certain, &reasons.join("; "), now);
                         let why = verdict.why().map(str::to_owned).into_iter().chain(reasons);
                         let why: Vec<String> = why.collect();
                         let words = verdict_text(verdict);
@@ -420,7 +425,8 @@ impl StatusData {
                     .verdict
                     .why()
                     .map_or(String::new(), |why| format!(": {why}"));
-                self.idle_reason = Some(format!("{}{why}", report.verdict.name().replace('-', " ")));
+                self.idle_reason =
+                    Some(format!("{}{why}", report.verdict.name().replace('-', " ")));
             }
         }
     }

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use elbowroom_num::{Rational, Accumulator};
+use elbowroom_num::{Accumulator, Rational};
 use elbowroom_plan::{
     Bound, Constraint, NodeId, Origin, ParameterId, Reason, Side, StnPlan, Valuation,
 };
@@ -69,7 +69,10 @@ impl KnownConflicts {
             }
         }
         for id in parameters {
-            self.by_parameter.entry(id).or_default().push(self.conflicts.len());
+            self.by_parameter
+                .entry(id)
+                .or_default()
+                .push(self.conflicts.len());
         }
         self.conflicts.push(KnownConflict {
             cycle,
@@ -150,7 +153,9 @@ pub(super) fn find(explainer: &Explainer<'_>, valuation: &Valuation) -> Option<C
     for (position, origin) in walked.iter().enumerate() {
         match origin {
             Edge::TimeZero => {}
-            Edge::AtLeast(constraint) => needs.extend(describe_lower_bound(explainer, constraint, valuation)),
+            Edge::AtLeast(constraint) => {
+                needs.extend(describe_lower_bound(explainer, constraint, valuation))
+            }
             Edge::AtMost(constraint) => {
                 let next = walked[(position + 1) % walked.len()];
                 rooms.push(describe_upper_bound(explainer, constraint, next, valuation));
@@ -176,9 +181,11 @@ impl Explainer<'_> {
         let nominal = self.plan.nominal();
         match side {
             Side::Lower => describe_lower_bound(self, constraint, &nominal),
-            Side::Upper => Some(match describe_upper_bound(self, constraint, Edge::TimeZero, &nominal) {
-                UpperBound::Action(words) | UpperBound::Limit(words) => words,
-            }),
+            Side::Upper => Some(
+                match describe_upper_bound(self, constraint, Edge::TimeZero, &nominal) {
+                    UpperBound::Action(words) | UpperBound::Limit(words) => words,
+                },
+            ),
         }
     }
 }
@@ -199,8 +206,8 @@ impl Explainer<'_> {
             own.map(|(index, _)| &plan.constraints[*index])
         };
         let nominal = self.plan.nominal();
-        let mut orders =
-            constraints(Side::Lower).filter_map(|it| describe_own_order(self, Edge::AtLeast(it), &nominal));
+        let mut orders = constraints(Side::Lower)
+            .filter_map(|it| describe_own_order(self, Edge::AtLeast(it), &nominal));
         if takes.is_empty()
             && let Some(order) = orders.next()
         {
@@ -287,7 +294,11 @@ fn sentence(needs: &[String], rooms: &[UpperBound]) -> String {
 
 /// Describes an edge that orders the start and the end of one action: because they interfere, or
 /// because of trajectory constraints, processes or events.
-fn describe_own_order(explainer: &Explainer<'_>, origin: Edge<'_>, valuation: &Valuation) -> Option<String> {
+fn describe_own_order(
+    explainer: &Explainer<'_>,
+    origin: Edge<'_>,
+    valuation: &Valuation,
+) -> Option<String> {
     let Edge::AtLeast(constraint) = origin else {
         return None;
     };

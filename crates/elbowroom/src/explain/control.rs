@@ -28,7 +28,10 @@ impl Explainer<'_> {
             }
         }
         unknown.sort_unstable();
-        let unknown: Vec<String> = unknown.into_iter().map(|id| self.describe_duration(id)).collect();
+        let unknown: Vec<String> = unknown
+            .into_iter()
+            .map(|id| self.describe_duration(id))
+            .collect();
         let mut reason = match unknown.as_slice() {
             [] => "no executor can see to this beforehand".to_owned(),
             _ => format!("one would have to know in advance {}", join_list(&unknown)),

@@ -6,7 +6,7 @@ use elbowroom_num::Rational;
 use elbowroom_stn::uncertain::{Conflict, Ground, LinkId};
 use elbowroom_stn::{ConstraintId, NodeId};
 
-use super::answer::{LinkDuration, Number, ControllabilityCheck, Reason, Step, Time, Verdict};
+use super::answer::{ControllabilityCheck, LinkDuration, Number, Reason, Step, Time, Verdict};
 
 /// Checks whether there is a schedule for some durations of the links.
 pub(super) fn consistent(file: &NetworkFile) -> ControllabilityCheck {

@@ -10,7 +10,7 @@ use elbowroom_stn::uncertain::Dispatchable;
 use elbowroom_stn::{ConsistentNetwork, ConstraintId};
 use serde::{Deserialize, Serialize};
 
-use super::answer::{ViolatedRequirement, Simulated};
+use super::answer::{Simulated, ViolatedRequirement};
 use super::dispatch::{self, Executor};
 use super::draws::Draws;
 

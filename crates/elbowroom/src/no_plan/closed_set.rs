@@ -7,7 +7,9 @@ use elbowroom_model::Task;
 use elbowroom_model::problem::ObjectId;
 use elbowroom_num::Rational;
 use elbowroom_verify::no_plan::closed::zone::Zone;
-use elbowroom_verify::no_plan::closed::{ClosedSet, Closure, FIRST_START, NOW, Node, RunningProcess, ZERO};
+use elbowroom_verify::no_plan::closed::{
+    ClosedSet, Closure, FIRST_START, NOW, Node, RunningProcess, ZERO,
+};
 use elbowroom_verify::no_plan::{Instances, ReachedFacts};
 
 use super::{Effort, EffortExhausted};
@@ -56,7 +58,10 @@ pub(super) fn closed_set(
     let alike = alike.iter().map(|class| class.iter().map(name).collect());
     Ok(ClosedSet {
         alike: alike.collect(),
-        states: states.iter().map(|node| closure.format_state(node)).collect(),
+        states: states
+            .iter()
+            .map(|node| closure.format_state(node))
+            .collect(),
     })
 }
 
@@ -113,9 +118,7 @@ fn states(
         if closure.is_goal(&node) {
             return Err(Failure::Reachable);
         }
-        let alike = known
-            .entry((node.running.clone(), node.timed))
-            .or_default();
+        let alike = known.entry((node.running.clone(), node.timed)).or_default();
         let covers = |own: &usize| {
             nodes[*own]
                 .as_ref()
@@ -152,7 +155,9 @@ fn states(
         let after = closure.successors(&node);
         let after = after.map_err(|flaw| Failure::Unknown(flaw.to_string()))?;
         let work = STATE_WORK * (1 + after.len() as u64) + tests;
-        effort.spend(work).map_err(|EffortExhausted| Failure::Stopped)?;
+        effort
+            .spend(work)
+            .map_err(|EffortExhausted| Failure::Stopped)?;
         for node in after {
             add(node, &mut nodes, &mut open)?;
         }

@@ -233,7 +233,10 @@ impl<'a> Table<'a> {
             let found = self.structure.contradiction(goal, self);
             let (one, other) = found.ok_or(Failure::Reachable)?;
             if *self.structure.relaxed_bound(one, other) != Earliest::Never {
-                wanted.add(self.single_bound(one, other, &|time| *time == Earliest::Never), self);
+                wanted.add(
+                    self.single_bound(one, other, &|time| *time == Earliest::Never),
+                    self,
+                );
             }
         }
         while let Some(key) = wanted.open.pop() {
@@ -257,9 +260,16 @@ impl<'a> Table<'a> {
     }
 
     /// Adds a bound that implies that a happening is not before `time`.
-    fn justify(&self, happening: usize, with: Option<usize>, time: &Earliest, wanted: &mut PendingClaims) {
+    fn justify(
+        &self,
+        happening: usize,
+        with: Option<usize>,
+        time: &Earliest,
+        wanted: &mut PendingClaims,
+    ) {
         let structure = self.structure;
-        let is_enough = |known: Earliest| structure.earliest_allowed_time(happening, known) >= *time;
+        let is_enough =
+            |known: Earliest| structure.earliest_allowed_time(happening, known) >= *time;
         let base = structure.earliest_without_bounds(happening, with);
         if base >= *time {
             return;
@@ -279,7 +289,8 @@ impl<'a> Table<'a> {
             look(one, other, delay.is_positive());
         });
         if let Some(atom) = with {
-            structure.visit_atoms_kept_with(happening, atom, &mut |one, other| look(one, other, false));
+            structure
+                .visit_atoms_kept_with(happening, atom, &mut |one, other| look(one, other, false));
         }
         if is_free {
             return;

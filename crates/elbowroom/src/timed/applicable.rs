@@ -7,7 +7,7 @@ use elbowroom_model::ground::{Action, FactId};
 use elbowroom_model::problem::{self, TimedChange, TimedInitial};
 use elbowroom_model::reachability::{self, Answer};
 use elbowroom_num::Rational;
-use elbowroom_sim::{FactOutcome, ExogenousChange, WorldModel};
+use elbowroom_sim::{ExogenousChange, FactOutcome, WorldModel};
 
 use super::{NotTabulated, Settings};
 
@@ -132,7 +132,9 @@ pub(super) fn facts_changed_by_failures(
         .flat_map(|failing| &failing.outcomes)
         .flat_map(|outcome| &outcome.changes);
     let facts = changes.filter_map(|change| match change.change {
-        FactOutcome::Truth(truth) => Some((task.fact_named(&change.target.instantiate(action))?, truth)),
+        FactOutcome::Truth(truth) => {
+            Some((task.fact_named(&change.target.instantiate(action))?, truth))
+        }
         FactOutcome::Value(_) | FactOutcome::ChangedBy(_) => None,
     });
     facts.collect()

@@ -50,7 +50,10 @@ impl EndProbabilities {
     }
 
     /// Returns the possible ends with their probabilities, and that of no end.
-    pub(super) fn outcomes(&self, act: &ActionModel) -> impl Iterator<Item = (f64, Option<Ending>)> {
+    pub(super) fn outcomes(
+        &self,
+        act: &ActionModel,
+    ) -> impl Iterator<Item = (f64, Option<Ending>)> {
         let badly = (0_u8..).zip(&self.failures);
         let badly = badly.map(|(way, p)| (*p, Some(Ending::Failure(way))));
         let draws = act.rest.iter().flat_map(|(_, end)| &end.draws);
@@ -93,8 +96,8 @@ impl CellProbabilities {
                 };
                 for cell in 0..=cells {
                     let until = boundary(cell + 1);
-                    let ended =
-                        end_probabilities(act, world, until, part, &shares).ok_or_else(unknown_shape)?;
+                    let ended = end_probabilities(act, world, until, part, &shares)
+                        .ok_or_else(unknown_shape)?;
                     hazards.push(hazard(&ended, &before));
                     before = ended;
                 }
@@ -139,9 +142,9 @@ impl CellProbabilities {
             }
             events.push(hazards);
         }
-        let next_end = ends
-            .iter()
-            .map(|hazards: &Vec<EndProbabilities>| next(hazards.iter().map(|ends| ends.total() > 0.0)));
+        let next_end = ends.iter().map(|hazards: &Vec<EndProbabilities>| {
+            next(hazards.iter().map(|ends| ends.total() > 0.0))
+        });
         let next_event = events
             .iter()
             .map(|hazards| next(hazards.iter().map(|p| *p > 0.0)));

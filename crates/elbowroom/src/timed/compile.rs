@@ -15,7 +15,7 @@ use elbowroom_sim::{Distribution, ExogenousChange, FailureTime, WorldModel};
 use super::NotTabulated;
 use super::action_model::{ActionModel, Event, Needs, Occurs, Snap};
 use super::applicable::facts_changed_by_failures;
-use super::value_intervals::{Amount, ChangeValue, ChangeOperator, Number, Test, units};
+use super::value_intervals::{Amount, ChangeOperator, ChangeValue, Number, Test, units};
 use super::world::Facts;
 
 /// Returns the facts and numbers that the goal depends on, through all actions and their failures.
@@ -59,7 +59,11 @@ fn relevant(
 }
 
 /// Adds the facts and fluents that a condition reads.
-fn collect_reads(condition: &Condition, facts: &mut BTreeSet<FactId>, numbers: &mut BTreeSet<FluentId>) {
+fn collect_reads(
+    condition: &Condition,
+    facts: &mut BTreeSet<FactId>,
+    numbers: &mut BTreeSet<FluentId>,
+) {
     condition.visit_facts(&mut |fact| {
         facts.insert(fact);
     });

@@ -88,7 +88,9 @@ impl Compiler<'_> {
             if !outcome.is_reported {
                 return refuse("failures with outcomes that are not reported");
             }
-            let Some((adds, deletes)) = self.facts_after_failure(name, failing, Some(outcome), start) else {
+            let Some((adds, deletes)) =
+                self.facts_after_failure(name, failing, Some(outcome), start)
+            else {
                 return refuse("failures with outcomes that change numbers");
             };
             rest -= outcome.probability;

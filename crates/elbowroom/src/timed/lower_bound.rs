@@ -5,7 +5,9 @@ use indexmap::IndexSet;
 
 use super::cell_probabilities::CellProbabilities;
 use super::failures::Ending;
-use super::graph::{Choice, Expansion, ReachabilityCache, Layers, Limits, MOST_WAYS, Nodes, Target};
+use super::graph::{
+    Choice, Expansion, Layers, Limits, MOST_WAYS, Nodes, ReachabilityCache, Target,
+};
 use super::state::{Phase, State};
 use super::world::TimedWorld;
 use super::{Side, Stop};
@@ -113,7 +115,11 @@ struct Cell<'c> {
 
 impl<'a> LowerBound<'a> {
     /// Creates the bound. Every manner is a policy, so it yields a lower bound.
-    pub(super) fn new(world: &'a TimedWorld, chances: &'a CellProbabilities, manner: DecisionEpochs) -> Self {
+    pub(super) fn new(
+        world: &'a TimedWorld,
+        chances: &'a CellProbabilities,
+        manner: DecisionEpochs,
+    ) -> Self {
         Self {
             world,
             chances,

@@ -2,21 +2,24 @@
 
 use std::collections::BTreeMap;
 
-use elbowroom_execution::{Move as Choice, ActionValues, DecisionState, RankedMoves};
+use elbowroom_execution::{ActionValues, DecisionState, Move as Choice, RankedMoves};
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
 use elbowroom_sim::{Side as Part, WorldModel};
 use indexmap::{IndexMap, IndexSet};
 
-use super::lower_bound::{LowerBound, DecisionEpochs, Move};
 use super::cell_probabilities::CellProbabilities;
-use super::graph::{Expansion, ReachabilityCache, Layers, Limits, Discounts, Values, backward_induction, solve_cell};
-use super::value_intervals::Span;
-use super::state::{Phase, Running, State};
+use super::graph::{
+    Discounts, Expansion, Layers, Limits, ReachabilityCache, Values, backward_induction, solve_cell,
+};
+use super::lower_bound::{DecisionEpochs, LowerBound, Move};
 use super::restricted_policy::Search;
+use super::state::{Phase, Running, State};
+use super::value_intervals::Span;
 use super::world::{Facts, TimedWorld};
 use super::{
-    Grid, NotTabulated, FIRST_STATES_DIVISOR, Settings, Side, TimedOptimum, grid, discrete_events, refine_bounds,
+    FIRST_STATES_DIVISOR, Grid, NotTabulated, Settings, Side, TimedOptimum, discrete_events, grid,
+    refine_bounds,
 };
 
 /// Table of the values of all states on the grid of the lower bound, for evaluating each move.
@@ -127,14 +130,22 @@ impl Policy {
             gap: CERTAINTY_TOLERANCE,
             ..settings.clone()
         };
-        search.refine(1.0, settings.most_states / FIRST_STATES_DIVISOR, &sure, goes_on);
+        search.refine(
+            1.0,
+            settings.most_states / FIRST_STATES_DIVISOR,
+            &sure,
+            goes_on,
+        );
         if 1.0 - search.lower() <= CERTAINTY_TOLERANCE {
             return Self::within(search, settings, goes_on);
         }
-        let whole = world.and_then(|world| match Self::for_known_times(&world, settings, goes_on)? {
-            Some(policy) => Ok(Some(policy)),
-            None => Self::if_near_optimal_in_full_process(world, settings, goes_on),
-        });
+        let whole =
+            world.and_then(
+                |world| match Self::for_known_times(&world, settings, goes_on)? {
+                    Some(policy) => Ok(Some(policy)),
+                    None => Self::if_near_optimal_in_full_process(world, settings, goes_on),
+                },
+            );
         if !matches!(whole, Ok(Some(_))) && 1.0 - search.lower() <= OPTIMALITY_GAP {
             return Self::within(search, settings, goes_on);
         }
@@ -147,14 +158,20 @@ impl Policy {
         settings: &Settings,
         goes_on: &dyn Fn() -> bool,
     ) -> Result<Option<Self>, NotTabulated> {
-        let found = discrete_events::bounds(world, settings, discrete_events::Effort::QUICK, goes_on)?;
-        let Some(found) = found.filter(|found| found.grid.upper - found.grid.lower <= OPTIMALITY_GAP) else {
+        let found =
+            discrete_events::bounds(world, settings, discrete_events::Effort::QUICK, goes_on)?;
+        let Some(found) =
+            found.filter(|found| found.grid.upper - found.grid.lower <= OPTIMALITY_GAP)
+        else {
             return Ok(None);
         };
         let Some(within) = found.within else {
             return Ok(None);
         };
-        let discrete_events::RestrictedAgent { world, epochs: manner } = within;
+        let discrete_events::RestrictedAgent {
+            world,
+            epochs: manner,
+        } = within;
         let chances = super::cell_probabilities_of(&world, found.cells, Side::Below)?;
         let step = exact_step(&world, found.cells);
         let optimum = TimedOptimum {
@@ -231,10 +248,14 @@ impl Policy {
         let step = world.horizon / cells as f64;
         let chances = CellProbabilities::new(&world, step, cells, Side::Below)?;
         let exact = exact_step(&world, cells);
-        Ok(
-            Self::of(world, chances, optimum, exact, (cells, DecisionEpochs::Always))
-                .with_values(settings, goes_on),
+        Ok(Self::of(
+            world,
+            chances,
+            optimum,
+            exact,
+            (cells, DecisionEpochs::Always),
         )
+        .with_values(settings, goes_on))
     }
 
     /// Creates the policy without its values.
@@ -264,7 +285,8 @@ impl Policy {
     fn with_values(mut self, settings: &Settings, goes_on: &dyn Fn() -> bool) -> Option<Self> {
         let mut left = settings.most_states;
         let bound = LowerBound::new(&self.world, &self.chances, self.epochs);
-        let (layers, values) = backward_induction(&bound, &mut left, self.discounts, goes_on).ok()?;
+        let (layers, values) =
+            backward_induction(&bound, &mut left, self.discounts, goes_on).ok()?;
         let tables = layers.into_iter().zip(values.0.into_values());
         let tables =
             tables.map(|((cell, states), values)| (cell, states.into_iter().zip(values).collect()));

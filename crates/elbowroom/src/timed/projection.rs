@@ -52,7 +52,8 @@ impl TimedWorld {
             .iter()
             .fold(0, |all, event| all | by_chance(event));
         let all: Facts = (0..self.facts.len()).fold(0, |all, place| all | 1 << place);
-        let mut certain = all & !events & !self.goal.mentions() & !self.facts_before_random_results();
+        let mut certain =
+            all & !events & !self.goal.mentions() & !self.facts_before_random_results();
         for act in &self.acts {
             if act.can_fail() {
                 certain &= !act.adds();

@@ -13,8 +13,8 @@ use elbowroom_sim::{Distribution, WorldModel};
 use serde::{Deserialize, Serialize};
 
 use super::action_model::Occurs;
-use super::lower_bound::{LowerBound, DecisionEpochs};
 use super::cell_probabilities::CellProbabilities;
+use super::lower_bound::{DecisionEpochs, LowerBound};
 use super::{ROUNDING_MARGIN, Settings, Side, TimedWorld, graph};
 
 /// A lower bound from a set of actions, each started after a happening.
@@ -163,7 +163,11 @@ impl Search {
 impl Set {
     /// Computes the bound on the next grid; `None` if it has too many states, or `goes_on` returns
     /// `false`.
-    fn next(&mut self, most_states: usize, goes_on: &dyn Fn() -> bool) -> Option<(RestrictedPolicy, FittedGrid)> {
+    fn next(
+        &mut self,
+        most_states: usize,
+        goes_on: &dyn Fn() -> bool,
+    ) -> Option<(RestrictedPolicy, FittedGrid)> {
         let fit = fitting(&self.world, self.cells, Side::Below)?;
         let step = fit.step();
         let chances = CellProbabilities::new(&self.world, step, fit.cells, Side::Below).ok()?;

@@ -134,7 +134,8 @@ impl State {
     /// Returns `true` if the goal is reached: it holds, and no action is running whose delayed
     /// failure could still violate it.
     pub(super) fn is_goal(&self, world: &TimedWorld) -> bool {
-        let holds_up = |running: &Running| world.acts[usize::from(running.act)].can_delay_its_failure();
+        let holds_up =
+            |running: &Running| world.acts[usize::from(running.act)].can_delay_its_failure();
         world.goal.holds(self.facts) && !self.is_undecided && !self.running.iter().any(holds_up)
     }
 

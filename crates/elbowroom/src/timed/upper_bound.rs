@@ -6,8 +6,10 @@ use indexmap::IndexSet;
 
 use super::Stop;
 use super::cell_probabilities::CellProbabilities;
-use super::graph::{Choice, Expansion, ReachabilityCache, Layers, Limits, MOST_WAYS, Nodes, Target};
 use super::discrete_events::{EndClasses, WaitingCache};
+use super::graph::{
+    Choice, Expansion, Layers, Limits, MOST_WAYS, Nodes, ReachabilityCache, Target,
+};
 use super::state::{Phase, State};
 use super::world::TimedWorld;
 

@@ -184,7 +184,9 @@ impl Test {
         match self.comparison {
             ComparisonOperator::AtMost => vec![self.bound],
             ComparisonOperator::AtLeast => vec![self.bound - 1],
-            ComparisonOperator::Equal | ComparisonOperator::Unequal => vec![self.bound - 1, self.bound],
+            ComparisonOperator::Equal | ComparisonOperator::Unequal => {
+                vec![self.bound - 1, self.bound]
+            }
         }
     }
 }

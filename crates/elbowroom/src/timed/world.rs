@@ -298,7 +298,8 @@ fn latest(events: &[Event], model: &WorldModel) -> Result<f64, NotTabulated> {
             continue;
         };
         let beyond = |time: f64| {
-            let share = rule.probability_of_side(time, Side::AtMost, 0.0, model.resolution.to_f64());
+            let share =
+                rule.probability_of_side(time, Side::AtMost, 0.0, model.resolution.to_f64());
             share.map(|share| 1.0 - share)
         };
         let mut time: f64 = 1.0;

@@ -3,12 +3,12 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use elbowroom::execute::{PlanPreparer, ExactRegion};
-use elbowroom::execution::executors::{ExecutorSpec, ExecutorServices};
+use elbowroom::execute::{ExactRegion, PlanPreparer};
+use elbowroom::execution::executors::{ExecutorServices, ExecutorSpec};
 use elbowroom::execution::run::{Report, Verdict};
 use elbowroom::execution::{
-    Cause, Decided, Ending, Entry, Executor, PreparedPlan, DecisionContext, PlanForm, Planned, Reason, Recorder,
-    RegionOracle, StepId,
+    Cause, Decided, DecisionContext, Ending, Entry, Executor, PlanForm, Planned, PreparedPlan,
+    Reason, Recorder, RegionOracle, StepId,
 };
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
@@ -262,7 +262,9 @@ fn live_rechecks_numbers_only_after_deviation() {
             ..Counting::default()
         })));
         let model = scene.world(world);
-        let execution = scene.execution("live").with_executor(ForwardingExecutor(live));
+        let execution = scene
+            .execution("live")
+            .with_executor(ForwardingExecutor(live));
         let report = execution.run_in(&mut *model.world(&scene.task, 0));
         assert_eq!(report.verdict, Verdict::GoalReached, "{report:#?}");
         // Later ends are only queried if the plan had no envelope.
@@ -287,7 +289,9 @@ fn duration_limits_do_not_depend_on_the_query_method() {
             ));
             let run = |means: ExecutorServices| {
                 let live: ExecutorSpec = "live".parse().unwrap();
-                let execution = scene.execution("live").with_executor(ForwardingExecutor(live.build(means)));
+                let execution = scene
+                    .execution("live")
+                    .with_executor(ForwardingExecutor(live.build(means)));
                 execution.run_in(&mut *model.world(&scene.task, seed))
             };
             let widened = run(ExecutorServices::from(Box::new(ExactRegion)));
@@ -401,7 +405,9 @@ fn box_of_remaining_plan_contains_all_its_actions() {
             ..Counting::default()
         };
         let live = live.build(ExecutorServices::from(Box::new(region)));
-        let execution = scene.execution("live").with_executor(ForwardingExecutor(live));
+        let execution = scene
+            .execution("live")
+            .with_executor(ForwardingExecutor(live));
         let report = execution.run_in(&mut *model.world(&scene.task, seed));
         assert_eq!(
             (report.verdict, report.replans),
@@ -496,7 +502,9 @@ fn values_inside_the_envelope_cause_no_query() {
             let model = scene.world(&world);
             let run = |means: ExecutorServices| {
                 let live: ExecutorSpec = "live".parse().unwrap();
-                let execution = scene.execution("live").with_executor(ForwardingExecutor(live.build(means)));
+                let execution = scene
+                    .execution("live")
+                    .with_executor(ForwardingExecutor(live.build(means)));
                 execution.run_in(&mut *model.world(&scene.task, seed))
             };
             let trusting = run(ExecutorServices::from(Box::new(ExactRegion)));

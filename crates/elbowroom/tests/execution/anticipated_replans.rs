@@ -2,11 +2,14 @@
 //! for planning in advance during a delay.
 
 use elbowroom::execute::Execution;
-use elbowroom::execution::{Command, Event, TimeAdvance, Request, World, WorldError};
+use elbowroom::execution::{Command, Event, Request, TimeAdvance, World, WorldError};
 use elbowroom::model::{RunningAction, Situation};
 use elbowroom::num::Rational;
 
-use crate::background_planner::{ScriptedBackgroundPlanner, AnnouncingWorld, RunResult, assert_has, seconds, settings, announcing_world, run_recorded_in};
+use crate::background_planner::{
+    AnnouncingWorld, RunResult, ScriptedBackgroundPlanner, announcing_world, assert_has,
+    run_recorded_in, seconds, settings,
+};
 use crate::persistent::scripted::{fact, pursue, task};
 use crate::scene::{Scene, irr};
 
@@ -169,8 +172,17 @@ fn predicted_events_are_part_of_the_anticipated_situation() {
         let (told, planner) = run_with_endless_walk(&wash, Vec::new());
         let desk = planner.state();
         assert_eq!(names(&desk.anticipated[0]), ["(walk)", "(dry)"]);
-        assert_eq!(desk.anticipated.len(), 1, "{milliseconds}: {:#?}", told.notes);
-        assert_eq!(desk.requested, desk.anticipated, "{milliseconds}: {:#?}", told.notes);
+        assert_eq!(
+            desk.anticipated.len(),
+            1,
+            "{milliseconds}: {:#?}",
+            told.notes
+        );
+        assert_eq!(
+            desk.requested, desk.anticipated,
+            "{milliseconds}: {:#?}",
+            told.notes
+        );
         let lift = lift(&told);
         assert!(lift < 16.0, "{milliseconds}, {lift}: {:#?}", told.notes);
     }

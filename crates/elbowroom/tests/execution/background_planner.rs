@@ -4,15 +4,16 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use elbowroom::execute::{PlanPreparer, Embedded, Execution};
+use elbowroom::execute::{Embedded, Execution, PlanPreparer};
 use elbowroom::execution::run::{Report, RunSettings};
 use elbowroom::execution::{
-    Command, Entry, Event, PlanForm, Observation, TimeAdvance, PlanAnswer, Planner, PlannerAnswer,
-    PrepareError, PreparationResult, Preparer, Recorder, PreparationRequest, World, WorldError,
+    Command, Entry, Event, Observation, PlanAnswer, PlanForm, Planner, PlannerAnswer,
+    PreparationRequest, PreparationResult, PrepareError, Preparer, Recorder, TimeAdvance, World,
+    WorldError,
 };
-use elbowroom::pipeline;
 use elbowroom::model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
+use elbowroom::pipeline;
 use elbowroom::report::trace::Line;
 
 use crate::persistent::scripted::{Notes, ScriptedWorld};
@@ -119,7 +120,10 @@ impl Planner for ScriptedBackgroundPlanner {
 }
 
 /// Preparer in the background that takes a given time; without one, it prepares at once.
-pub(crate) struct ScriptedBackgroundPreparer(pub(crate) ScriptedBackgroundPlanner, pub(crate) pipeline::Settings);
+pub(crate) struct ScriptedBackgroundPreparer(
+    pub(crate) ScriptedBackgroundPlanner,
+    pub(crate) pipeline::Settings,
+);
 
 impl Preparer for ScriptedBackgroundPreparer {
     fn prepare(

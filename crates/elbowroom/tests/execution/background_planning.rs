@@ -9,9 +9,11 @@ use elbowroom::execution::{Event, Request};
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
 
-use crate::background_planner::{ScriptedBackgroundPlanner, RunResult, assert_has, seconds, settings, run_recorded};
+use crate::background_planner::{
+    RunResult, ScriptedBackgroundPlanner, assert_has, run_recorded, seconds, settings,
+};
 use crate::persistent::scripted::{abandon, fact, pursue, task};
-use crate::random_events::{RandomScript, ITEMS, assert_in_order, assert_plays_back};
+use crate::random_events::{ITEMS, RandomScript, assert_in_order, assert_plays_back};
 use crate::recorded::assert_as_recorded;
 use crate::scene::irr;
 
@@ -23,7 +25,12 @@ fn execution<'a>(task: &Arc<Task>, executor: &str) -> Execution<'a> {
 }
 
 /// Makes a persistent run by `guarded`.
-fn run_persistent(task: &Arc<Task>, end: i64, script: Vec<(i64, Event)>, planner: &ScriptedBackgroundPlanner) -> RunResult {
+fn run_persistent(
+    task: &Arc<Task>,
+    end: i64,
+    script: Vec<(i64, Event)>,
+    planner: &ScriptedBackgroundPlanner,
+) -> RunResult {
     let script = script
         .into_iter()
         .map(|(time, event)| (seconds(time), event));
@@ -53,7 +60,12 @@ fn current_plan_continues_during_planning_for_new_goal() {
     );
     assert_eq!(told.report.starts, 3, "{:#?}", told.notes);
     let desk = planner.state();
-    assert_eq!((desk.started_searches, desk.awaited_searches), (2, 0), "{:#?}", told.notes);
+    assert_eq!(
+        (desk.started_searches, desk.awaited_searches),
+        (2, 0),
+        "{:#?}",
+        told.notes
+    );
 }
 
 #[test]
@@ -79,7 +91,8 @@ fn search_ends_at_deadline_that_makes_goal_unreachable() {
 fn actions_done_during_planning_are_not_repeated() {
     let task = task("(free s)", "(and (have book) (have cup))");
     for search in [0, 1, 4, 9, 14, 30] {
-        let planner = ScriptedBackgroundPlanner::with_planning_times(&[seconds(0), seconds(search)]);
+        let planner =
+            ScriptedBackgroundPlanner::with_planning_times(&[seconds(0), seconds(search)]);
         let script = vec![(2, pursue("key", "(have key)"))];
         let told = run_persistent(&task, 200, script, &planner);
         assert_has(&told, &["rest: goal-reached"]);
@@ -169,7 +182,8 @@ fn pause_during_search_delays_adoption() {
 #[test]
 fn abandoned_goal_ends_its_search() {
     let task = task("", "(have book)");
-    let planner = ScriptedBackgroundPlanner::with_planning_times(&[seconds(0), seconds(1000), seconds(1)]);
+    let planner =
+        ScriptedBackgroundPlanner::with_planning_times(&[seconds(0), seconds(1000), seconds(1)]);
     let script = vec![
         (2, pursue("key", "(have key)")),
         (4, abandon("key")),
@@ -188,7 +202,12 @@ fn abandoned_goal_ends_its_search() {
     );
     // The last plan arrives when its goal is abandoned, so there is no open request to abandon.
     let desk = planner.state();
-    assert_eq!((desk.started_searches, desk.abandoned_searches), (4, 1), "{:#?}", told.notes);
+    assert_eq!(
+        (desk.started_searches, desk.abandoned_searches),
+        (4, 1),
+        "{:#?}",
+        told.notes
+    );
 }
 
 /// The run acts even if goals are added or abandoned faster than plans can be made.
@@ -218,7 +237,11 @@ fn frequent_goal_changes_do_not_starve_the_run() {
             told.notes
         );
         assert_has(&told, &["rest: goal-reached"]);
-        assert!(planner.state().started_searches < 30, "{}", planner.state().started_searches);
+        assert!(
+            planner.state().started_searches < 30,
+            "{}",
+            planner.state().started_searches
+        );
     }
 }
 
@@ -244,7 +267,12 @@ fn search_for_abandoned_goals_ends() {
         ],
     );
     let desk = planner.state();
-    assert_eq!((desk.started_searches, desk.abandoned_searches), (6, 4), "{:#?}", told.notes);
+    assert_eq!(
+        (desk.started_searches, desk.abandoned_searches),
+        (6, 4),
+        "{:#?}",
+        told.notes
+    );
 }
 
 #[test]
@@ -284,7 +312,11 @@ fn run_without_plan_is_idle_and_finished_run_ends() {
     );
 }
 
-fn run_with_one_plan(task: &Arc<Task>, script: (i64, Vec<(Rational, Event)>), planner: &ScriptedBackgroundPlanner) -> RunResult {
+fn run_with_one_plan(
+    task: &Arc<Task>,
+    script: (i64, Vec<(Rational, Event)>),
+    planner: &ScriptedBackgroundPlanner,
+) -> RunResult {
     run_recorded(execution(task, "guarded"), task, script, planner, &[])
 }
 
@@ -293,7 +325,8 @@ fn run_with_one_plan(task: &Arc<Task>, script: (i64, Vec<(Rational, Event)>), pl
 #[test]
 fn outdated_plan_is_replaced() {
     let task = task("", "(and (have book) (have cup))");
-    let planner = ScriptedBackgroundPlanner::with_planning_times(&[seconds(0), seconds(6), seconds(6)]);
+    let planner =
+        ScriptedBackgroundPlanner::with_planning_times(&[seconds(0), seconds(6), seconds(6)]);
     let script = vec![
         (2, pursue("key", "(have key)")),
         (5, fact(&task, "(here key)", false)),

@@ -4,14 +4,17 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use elbowroom::execute::{PlanPreparer, Execution};
+use elbowroom::execute::{Execution, PlanPreparer};
 use elbowroom::execution::run::RunSettings;
 use elbowroom::execution::{Event, Request};
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
 use elbowroom::report::trace::ReplayPreparer;
 
-use crate::background_planner::{ScriptedBackgroundPlanner, ScriptedBackgroundPreparer, RunResult, assert_has, seconds, settings, run_recorded};
+use crate::background_planner::{
+    RunResult, ScriptedBackgroundPlanner, ScriptedBackgroundPreparer, assert_has, run_recorded,
+    seconds, settings,
+};
 use crate::persistent::scripted::{RandomNumbers, abandon, fact, pursue, task};
 use crate::random_events::{RandomScript, assert_in_order, assert_plays_back, is_start};
 use crate::recorded::assert_as_recorded;
@@ -30,10 +33,16 @@ fn execution<'a>(task: &Arc<Task>, executor: &str) -> Execution<'a> {
 }
 
 /// Makes a run by `guarded`.
-fn run(task: &Arc<Task>, end: i64, script: Vec<(i64, Event)>, planner: &ScriptedBackgroundPlanner) -> RunResult {
+fn run(
+    task: &Arc<Task>,
+    end: i64,
+    script: Vec<(i64, Event)>,
+    planner: &ScriptedBackgroundPlanner,
+) -> RunResult {
     let script = script.into_iter();
     let script = script.map(|(time, event)| (seconds(time), event));
-    let execution = execution(task, "guarded").with_preparer(ScriptedBackgroundPreparer(planner.clone(), irr()));
+    let execution = execution(task, "guarded")
+        .with_preparer(ScriptedBackgroundPreparer(planner.clone(), irr()));
     run_recorded(execution, task, (end, script.collect()), planner, &[])
 }
 
@@ -82,7 +91,8 @@ fn action_missing_in_new_plan_is_not_started() {
 #[test]
 fn requests_during_preparation_are_handled_at_once() {
     let task = task("", "(have book)");
-    let planner = ScriptedBackgroundPlanner::with_planning_times(&[seconds(1)]).with_preparation_times(&[seconds(30)]);
+    let planner = ScriptedBackgroundPlanner::with_planning_times(&[seconds(1)])
+        .with_preparation_times(&[seconds(30)]);
     let script = vec![
         (3, pursue("odd", "(have spoon)")),
         (4, pursue("key", "(have key)")),
@@ -106,7 +116,8 @@ fn requests_during_preparation_are_handled_at_once() {
 #[test]
 fn frequent_events_do_not_starve_the_run() {
     let task = task("", "(and (have book) (have cup))");
-    let planner = ScriptedBackgroundPlanner::with_planning_times(&[seconds(1)]).with_preparation_times(&[seconds(5)]);
+    let planner = ScriptedBackgroundPlanner::with_planning_times(&[seconds(1)])
+        .with_preparation_times(&[seconds(5)]);
     let script = (1..90).map(|second| (second, fact(&task, "(here key)", second % 2 == 0)));
     let told = run(&task, 200, script.collect(), &planner);
     assert_has(
@@ -120,7 +131,8 @@ fn frequent_events_do_not_starve_the_run() {
 #[test]
 fn kept_plan_continues_during_preparation() {
     let task = task("", "(and (have book) (have cup))");
-    let planner = ScriptedBackgroundPlanner::with_planning_times(&[seconds(0)]).with_preparation_times(&[seconds(0), seconds(15)]);
+    let planner = ScriptedBackgroundPlanner::with_planning_times(&[seconds(0)])
+        .with_preparation_times(&[seconds(0), seconds(15)]);
     let script = vec![(2, pursue("too", "(have cup)"))];
     let told = run(&task, 100, script, &planner);
     assert_has(
@@ -160,8 +172,10 @@ fn random_run(
         quarters,
         mut dice,
     } = RandomScript::draw(task, seed);
-    let planner = ScriptedBackgroundPlanner::with_planning_times(&lengths).with_preparation_times(&readying(&mut dice));
-    let execution = execution(task, executor(seed)).with_preparer(ScriptedBackgroundPreparer(planner.clone(), irr()));
+    let planner = ScriptedBackgroundPlanner::with_planning_times(&lengths)
+        .with_preparation_times(&readying(&mut dice));
+    let execution = execution(task, executor(seed))
+        .with_preparer(ScriptedBackgroundPreparer(planner.clone(), irr()));
     let told = run_recorded(execution, task, (500, script), &planner, &quarters);
     (told, planner)
 }

@@ -3,10 +3,13 @@
 
 use elbowroom::execution::Cause;
 use elbowroom::execution::run::{PlanningTime, Report, RunSettings, Verdict};
-use elbowroom::pipeline;
 use elbowroom::num::Rational;
+use elbowroom::pipeline;
 
-use crate::background_planner::{ScriptedBackgroundPlanner, ScriptedBackgroundPreparer, RunResult, assert_has, settings, run_recorded};
+use crate::background_planner::{
+    RunResult, ScriptedBackgroundPlanner, ScriptedBackgroundPreparer, assert_has, run_recorded,
+    settings,
+};
 use crate::scene::Scene;
 
 /// A large robot and a fast one. Either of them may walk to a place and inspect it before a deadline.
@@ -58,12 +61,16 @@ fn plan_with_more_slack_takes_over_while_the_present_one_is_still_feasible() {
 /// Runs with a planner in the background. The walk of the large robot takes 22.5 s.
 fn run_with_background_planner(fast_pace: u32, seconds: i64, readying: &[Rational]) -> RunResult {
     let scene = scene(25, fast_pace);
-    let planner = ScriptedBackgroundPlanner::with_planning_times(&[seconds.into()]).with_preparation_times(readying);
+    let planner = ScriptedBackgroundPlanner::with_planning_times(&[seconds.into()])
+        .with_preparation_times(readying);
     let execution = scene.execution("live").with_settings(RunSettings {
         readies_aside: !readying.is_empty(),
         ..settings()
     });
-    let execution = execution.with_preparer(ScriptedBackgroundPreparer(planner.clone(), scene.flow.clone()));
+    let execution = execution.with_preparer(ScriptedBackgroundPreparer(
+        planner.clone(),
+        scene.flow.clone(),
+    ));
     run_recorded(
         execution,
         &scene.task,

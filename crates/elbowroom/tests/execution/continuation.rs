@@ -4,8 +4,8 @@
 use elbowroom::execution::Cause;
 use elbowroom::execution::executors::DEFAULT_EXECUTOR;
 use elbowroom::execution::run::{PlanningTime, Report, Verdict};
-use elbowroom::pipeline;
 use elbowroom::num::Rational;
+use elbowroom::pipeline;
 
 use crate::scene::Scene;
 

@@ -1,7 +1,7 @@
 //! Baseline of paper 2 on a clock.
 
 use elbowroom::execution::run::{Report, Verdict};
-use elbowroom::execution::{Subject, Cause};
+use elbowroom::execution::{Cause, Subject};
 use elbowroom::num::Rational;
 
 use crate::scene::Scene;

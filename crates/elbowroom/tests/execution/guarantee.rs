@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::sync::Arc;
 
-use elbowroom::execute::{PlanPreparer, CachingPreparer};
+use elbowroom::execute::{CachingPreparer, PlanPreparer};
 use elbowroom::execution::NoRecord;
 use elbowroom::execution::run::{TimeoutRule, Verdict};
 use elbowroom::model::ground::{Action, Body, Change, Expression, FluentId};

@@ -6,8 +6,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use elbowroom::execute::Embedded;
 use elbowroom::execution::run::{MissingPlan, Report, RunSettings, Verdict};
 use elbowroom::execution::{
-    Command, Ending, Event, NoPlanner, Observation, TimeAdvance, Planner, PlannerAnswer, ActionHandle, World,
-    WorldError,
+    ActionHandle, Command, Ending, Event, NoPlanner, Observation, Planner, PlannerAnswer,
+    TimeAdvance, World, WorldError,
 };
 use elbowroom::model::{Situation, Task};
 use elbowroom::num::Rational;

@@ -4,8 +4,9 @@ use std::sync::{Arc, Mutex};
 
 use elbowroom::execution::run::Report;
 use elbowroom::execution::{
-    Cause, Decided, Decision, Ending, Executor, DispatchableCache, PreparedPlan, DecisionContext, PlanForm, PlanEvent, NoPlanner,
-    Order, Planned, PrepareError, PreparationResult, Preparer, Reason, StepId,
+    Cause, Decided, Decision, DecisionContext, DispatchableCache, Ending, Executor, NoPlanner,
+    Order, PlanEvent, PlanForm, Planned, PreparationResult, PrepareError, PreparedPlan, Preparer,
+    Reason, StepId,
 };
 use elbowroom::model::{State, Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;

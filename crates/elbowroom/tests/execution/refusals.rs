@@ -5,12 +5,12 @@ use std::sync::atomic::Ordering;
 use elbowroom::execute::Execution;
 use elbowroom::execution::run::{RunSettings, Verdict};
 use elbowroom::execution::{
-    Command, Ending, Event, Observation, TimeAdvance, Request, World, WorldError,
+    Command, Ending, Event, Observation, Request, TimeAdvance, World, WorldError,
 };
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
 
-use crate::background_planner::{ScriptedBackgroundPlanner, AnnouncingWorld, announcing_world};
+use crate::background_planner::{AnnouncingWorld, ScriptedBackgroundPlanner, announcing_world};
 use crate::persistent::scripted::{Notes, fact, pursue, task};
 
 /// World that refuses all starts before a time.

@@ -5,7 +5,8 @@ use std::sync::Arc;
 use elbowroom::execute::PlanPreparer;
 use elbowroom::execution::run::{Report, RunningRule, Verdict};
 use elbowroom::execution::{
-    Cause, Command, Ending, Event, NoRecord, Observation, TimeAdvance, ActionHandle, World, WorldError,
+    ActionHandle, Cause, Command, Ending, Event, NoRecord, Observation, TimeAdvance, World,
+    WorldError,
 };
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
@@ -147,15 +148,20 @@ fn end_that_is_never_reported_times_out() {
     scene.settings.timeout = "2x,30".parse().expect("a correct test");
     for executor in ["fixed:1000", "live"] {
         let mut lost = None;
-        let report = run(&scene, executor, &WorldModel::without_deviations(), &mut |it| {
-            // The first end of any action.
-            if let Some((ticket, _)) = ended(&it)
-                && *lost.get_or_insert(ticket) == ticket
-            {
-                return Vec::new();
-            }
-            vec![it]
-        });
+        let report = run(
+            &scene,
+            executor,
+            &WorldModel::without_deviations(),
+            &mut |it| {
+                // The first end of any action.
+                if let Some((ticket, _)) = ended(&it)
+                    && *lost.get_or_insert(ticket) == ticket
+                {
+                    return Vec::new();
+                }
+                vec![it]
+            },
+        );
         assert!(lost.is_some());
         // Either the action times out, or the plan that waits for it is abandoned before.
         let cause = causes(&report)[0];
@@ -177,12 +183,17 @@ fn end_that_is_never_reported_times_out() {
 fn a_start_that_is_never_reported_is_known_from_its_end() {
     let scene = Scene::case("delivery");
     for executor in EXECUTORS.iter() {
-        let report = run(&scene, executor, &WorldModel::without_deviations(), &mut |it| {
-            if matches!(it.event, Event::Started { .. }) {
-                return Vec::new();
-            }
-            vec![it]
-        });
+        let report = run(
+            &scene,
+            executor,
+            &WorldModel::without_deviations(),
+            &mut |it| {
+                if matches!(it.event, Event::Started { .. }) {
+                    return Vec::new();
+                }
+                vec![it]
+            },
+        );
         assert_eq!(
             report.verdict,
             Verdict::GoalReached,

@@ -3,18 +3,20 @@
 use std::sync::{Arc, LazyLock};
 
 use elbowroom::answers::envelope::Search;
-use elbowroom::execute::{PlanPreparer, Embedded, Execution, MostProbablePlanner, SharedMostProbablePlanner, Validated};
+use elbowroom::execute::{
+    Embedded, Execution, MostProbablePlanner, PlanPreparer, SharedMostProbablePlanner, Validated,
+};
 use elbowroom::execution::executors::{self, ExecutorSpec};
 use elbowroom::execution::run::{PlanningTime, Report, RunSettings, Verdict};
 use elbowroom::execution::{NoRecord, Planner, PreparationResult, Preparer, Recorder, World};
-use elbowroom::pipeline;
 use elbowroom::model::validate::{self, validate};
 use elbowroom::model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 use elbowroom::pddl::{self, Source};
+use elbowroom::pipeline;
 use elbowroom::planner::embedded;
 use elbowroom::probability::{Likelihoods, likelihoods};
-use elbowroom::sim::{ReportReliability, SimWorld, FaultInjector, WorldModel};
+use elbowroom::sim::{FaultInjector, ReportReliability, SimWorld, WorldModel};
 
 /// One of each executor in the registry, so that new ones are tested automatically.
 pub(crate) static EXECUTORS: LazyLock<Vec<&'static str>> = LazyLock::new(|| {

@@ -5,8 +5,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use elbowroom::execution::run::{Report, Verdict};
 use elbowroom::execution::{
-    Evidence, Cause, Command, Ending, Event, NoPlanner, NoRecord, Observation, TimeAdvance, Planner,
-    Recorder, World, WorldError,
+    Cause, Command, Ending, Event, Evidence, NoPlanner, NoRecord, Observation, Planner, Recorder,
+    TimeAdvance, World, WorldError,
 };
 use elbowroom::num::Rational;
 use elbowroom::report::trace::{Replay, ReplayPlanner, ReplayWorld, Stored, TraceWriter};

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use elbowroom::answers::run::simulate;
-use elbowroom::answers::{RunAnswer, RunRequest, NoObserver};
-use elbowroom::execute::{NamedText, RunSpec, SpecError, AdversarySettings};
+use elbowroom::answers::{NoObserver, RunAnswer, RunRequest};
+use elbowroom::execute::{AdversarySettings, NamedText, RunSpec, SpecError};
 use elbowroom::execution::run::Verdict;
 use elbowroom::model::Task;
 use elbowroom::num::Rational;

@@ -3,17 +3,17 @@
 use std::sync::Arc;
 
 use elbowroom::execute::{
-    PlanPreparer, Embedded, Execution, External, MostProbablePlanner, CachingPlanner, CachingPreparer,
-    SharedMostProbablePlanner, ExactRegion,
+    CachingPlanner, CachingPreparer, Embedded, ExactRegion, Execution, External,
+    MostProbablePlanner, PlanPreparer, SharedMostProbablePlanner,
 };
-use elbowroom::execution::run::{Next, UnexpectedAnswer, Report, Run, Verdict};
+use elbowroom::execution::run::{Next, Report, Run, UnexpectedAnswer, Verdict};
 use elbowroom::execution::{
-    Answer, Command, Executor, TimeAdvance, PlanAnswer, PlannerAnswer, RequestId, Urgency, Workers,
+    Answer, Command, Executor, PlanAnswer, PlannerAnswer, RequestId, TimeAdvance, Urgency, Workers,
     World, WorldError,
 };
 use elbowroom::num::Rational;
 use elbowroom::report::trace::{Replay, ReplayPlanner, ReplayWorld, Stored, TraceWriter};
-use elbowroom::sim::{SimWorld, FaultInjector};
+use elbowroom::sim::{FaultInjector, SimWorld};
 
 use crate::scene::{EXECUTORS, Scene};
 
@@ -25,7 +25,12 @@ fn assembled_parts_are_send() {
     is_send::<Execution<'static>>();
     is_send::<Box<dyn Executor>>();
     is_send::<Box<dyn World>>();
-    is_send::<(PlanPreparer, ExactRegion, Embedded<'static>, External<'static>)>();
+    is_send::<(
+        PlanPreparer,
+        ExactRegion,
+        Embedded<'static>,
+        External<'static>,
+    )>();
     is_send::<(MostProbablePlanner<'static>, SharedMostProbablePlanner)>();
     is_send::<(
         CachingPlanner<Embedded<'static>>,
@@ -64,7 +69,10 @@ fn driven(mut run: Run<'_>, world: &mut dyn World, workers: &mut dyn Workers) ->
         let answer = match next {
             Next::Command(command) => world.command(&run.now().clone(), &command),
             Next::Wait { until } => world.wait(&until).map(|passage| {
-                assert!(run.observe_requested(Vec::new()).is_err(), "a wait is no look");
+                assert!(
+                    run.observe_requested(Vec::new()).is_err(),
+                    "a wait is no look"
+                );
                 run.observe(passage).expect("it was asked for");
             }),
             Next::Look { facts, fluents } => world.look(&facts, &fluents).map(|seen| {

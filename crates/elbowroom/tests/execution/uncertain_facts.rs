@@ -5,8 +5,8 @@ use std::sync::Arc;
 use elbowroom::execute::PlanPreparer;
 use elbowroom::execution::run::{Report, Verdict};
 use elbowroom::execution::{
-    Cause, Command, Doubt, Ending, Event, NoRecord, Observation, TimeAdvance, BeliefState, ActionHandle,
-    World, WorldError,
+    ActionHandle, BeliefState, Cause, Command, Doubt, Ending, Event, NoRecord, Observation,
+    TimeAdvance, World, WorldError,
 };
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;

@@ -4,8 +4,8 @@ use std::sync::{Arc, Mutex};
 
 use elbowroom::execute::{Execution, Validated};
 use elbowroom::execution::{
-    Cause, Decided, Decision, Executor, PreparedPlan, DecisionContext, PlanForm, NoRecord, Order, Planned, Reason,
-    StepId,
+    Cause, Decided, Decision, DecisionContext, Executor, NoRecord, Order, PlanForm, Planned,
+    PreparedPlan, Reason, StepId,
 };
 use elbowroom::num::Rational;
 use elbowroom::report::validation::Invalid;
@@ -84,7 +84,8 @@ fn objections(orders: &[(i64, i64)], world: &str) -> Vec<String> {
     };
     let told = Mutex::new(Vec::new());
     let (recorder, validation) = Validated::new(NoRecord, &scene.task, None);
-    let recorder = recorder.on_finding(|invalid| told.lock().expect("no panic").push(invalid.clone()));
+    let recorder =
+        recorder.on_finding(|invalid| told.lock().expect("no panic").push(invalid.clone()));
     let model = scene.world(world);
     let mut world = SimWorld::new(Arc::clone(&scene.task), &model, 1);
     let mut settings = scene.settings.clone();

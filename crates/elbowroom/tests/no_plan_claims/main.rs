@@ -10,9 +10,9 @@
 #[path = "../../../stn/tests/game/mod.rs"]
 mod game;
 
-mod mid_execution;
 mod conflicts;
 mod draft;
+mod mid_execution;
 mod situations;
 mod unsolvable;
 

@@ -145,7 +145,13 @@ fn draw(random: &mut Random) -> MidExecution {
 }
 
 /// Draws a situation in the middle of the execution of a problem with `count` actions.
-fn mid_execution_problem(random: &mut Random, domain: &str, init: &str, goal: &str, count: usize) -> MidExecution {
+fn mid_execution_problem(
+    random: &mut Random,
+    domain: &str,
+    init: &str,
+    goal: &str,
+    count: usize,
+) -> MidExecution {
     let problem = format!(
         "(define (problem p) (:domain d) (:objects a b c - thing) (:init {init}) (:goal (and {goal})))"
     );

@@ -45,9 +45,9 @@ impl Polytope {
             bound + LOOSENING - sum
         });
         let own = at.iter().zip(self.least.iter().zip(&self.most));
-        rows.chain(
-            own.flat_map(|(value, (least, most))| [value + LOOSENING - least, most + LOOSENING - value]),
-        )
+        rows.chain(own.flat_map(|(value, (least, most))| {
+            [value + LOOSENING - least, most + LOOSENING - value]
+        }))
         .collect()
     }
 

@@ -7,15 +7,15 @@ use elbowroom_num::Rational;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan};
 
 use super::concave_maximum::CaseContext;
-use super::objective::{ObjectiveFunction, Outcome};
 use super::master::{Master, Span};
-use super::{BestProof, BestRun, BestStep, ProofCase, OptimalityProof, TangentPoint, Variables};
+use super::objective::{ObjectiveFunction, Outcome};
+use super::{BestProof, BestRun, BestStep, OptimalityProof, ProofCase, TangentPoint, Variables};
 use crate::cut::{Cut, Ground};
 use crate::cut_generation::CheckOutcome;
+use crate::line_search::{LineSearch, end_index};
 use crate::linear::Terms;
 use crate::obligations::Refusal;
 use crate::oracle::Oracle;
-use crate::line_search::{LineSearch, end_index};
 use crate::row::Row;
 
 /// Number of halvings of each end when a refused box is shrunk because no linear cut is known.
@@ -177,7 +177,11 @@ impl Search<'_> {
     /// Returns values of the variables whose box lies inside another one.
     fn values_in(&self, envelope: &DecoupledEnvelope) -> Vec<Rational> {
         let point = DecoupledEnvelope::point(&self.plan.nominal());
-        let variables = self.variables.ends.iter().zip(&self.variables.max_distances);
+        let variables = self
+            .variables
+            .ends
+            .iter()
+            .zip(&self.variables.max_distances);
         let values = variables.map(|(ends, most)| {
             let moved = ends.iter().map(|end| {
                 let far = end.reach(envelope);
@@ -359,7 +363,12 @@ impl Search<'_> {
         let reached = ray.search(self.oracle, &zero, &one, &mut cuts, &mut |_, _| {
             ControlFlow::Continue(())
         })?;
-        self.record_if_better(values.iter().map(|value| value * &reached.lower_bound).collect());
+        self.record_if_better(
+            values
+                .iter()
+                .map(|value| value * &reached.lower_bound)
+                .collect(),
+        );
         for cut in cuts.into_iter().skip(known) {
             self.add_cut(cut);
         }

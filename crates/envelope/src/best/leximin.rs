@@ -11,11 +11,11 @@ use std::ops::ControlFlow;
 use elbowroom_num::Rational;
 use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan};
 
-use super::{BestProof, BestRun, BestStep, OptimalityProof, BlockedVariable, Variables};
+use super::{BestProof, BestRun, BestStep, BlockedVariable, OptimalityProof, Variables};
 use crate::cut::Cut;
+use crate::line_search::{LineSearch, SearchBounds, end_index};
 use crate::obligations::Refusal;
 use crate::oracle::Oracle;
-use crate::line_search::{LineSearch, SearchBounds, end_index};
 
 /// The state of the search.
 struct LeximinSearch<'a> {
@@ -106,7 +106,11 @@ pub(super) fn maximize_leximin(
 impl LeximinSearch<'_> {
     /// Computes the greatest slack of all growing variables, or of one of them while the others
     /// stay.
-    fn max_slack(&mut self, alone: Option<usize>, level: &Rational) -> Result<SearchBounds, Refusal> {
+    fn max_slack(
+        &mut self,
+        alone: Option<usize>,
+        level: &Rational,
+    ) -> Result<SearchBounds, Refusal> {
         let mut ray = LineSearch::new(self.plan);
         let mut most = level.clone();
         for (variable, ends) in self.variables.ends.iter().enumerate() {
@@ -153,7 +157,8 @@ impl LeximinSearch<'_> {
     fn stop_blocked(&mut self, level: &Rational, reached: &SearchBounds) -> Result<bool, Refusal> {
         let mut any = false;
         for variable in 0..self.variables.count() {
-            let far = self.variables.max_distances[variable].checked_div(&self.variables.scales[variable]);
+            let far = self.variables.max_distances[variable]
+                .checked_div(&self.variables.scales[variable]);
             let far = far.unwrap_or_default();
             if self.stopped[variable].is_none() && far <= *level {
                 self.stop_variable(variable, &far, None);

@@ -1,7 +1,9 @@
 //! The logarithm of an interval's probability in floating-point numbers, used for proposals only.
 
 use elbowroom_num::Rational;
-use elbowroom_num::log_concave::{Cell, LogConcaveDistribution, CutPosition, Dense, Density, Reach, Steps};
+use elbowroom_num::log_concave::{
+    Cell, CutPosition, Dense, Density, LogConcaveDistribution, Reach, Steps,
+};
 
 use super::barrier::Concave;
 
@@ -43,7 +45,9 @@ impl LogProbability {
         ends: [usize; 2],
     ) -> Self {
         let kind = match chance {
-            LogConcaveDistribution::Dense(dense) => dense_kind(dense, nominal, cell).unwrap_or(Kind::Unknown),
+            LogConcaveDistribution::Dense(dense) => {
+                dense_kind(dense, nominal, cell).unwrap_or(Kind::Unknown)
+            }
             LogConcaveDistribution::Values(values) => {
                 let steps = Steps::new(values, nominal, cell);
                 let spans = [&cell.below, &cell.above];
@@ -172,7 +176,10 @@ fn dense_kind(dense: &Dense, nominal: &Rational, cell: &Cell) -> Option<Kind> {
         nominal,
         margin: dense.margin.to_f64(),
         stops: [nominal - far[0], nominal + far[1]],
-        is_whole: [seen[0] == CutPosition::AlwaysReached, seen[1] == CutPosition::AlwaysReached],
+        is_whole: [
+            seen[0] == CutPosition::AlwaysReached,
+            seen[1] == CutPosition::AlwaysReached,
+        ],
         gains,
     })
 }

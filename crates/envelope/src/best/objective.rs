@@ -90,7 +90,11 @@ impl ObjectiveFunction {
 
     /// Returns a variable and a value that split a case into two parts with tighter bounds on the
     /// objective; `None` if there is none.
-    pub(super) fn split_point(&self, spans: &[Span], touches: &[TangentPoint]) -> Option<(usize, Rational)> {
+    pub(super) fn split_point(
+        &self,
+        spans: &[Span],
+        touches: &[TangentPoint],
+    ) -> Option<(usize, Rational)> {
         match self {
             Self::Sum(_) | Self::Volume(_) => None,
             Self::Probability(probability) => probability.split_point(spans, touches),

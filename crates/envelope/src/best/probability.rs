@@ -9,15 +9,17 @@
 
 use std::ops::ControlFlow;
 
-use elbowroom_num::log_concave::{Cell, LogConcaveDistribution, CutPosition, Dense, Reach, Steps, TangentPoint};
+use elbowroom_num::log_concave::{
+    Cell, CutPosition, Dense, LogConcaveDistribution, Reach, Steps, TangentPoint,
+};
 use elbowroom_num::{Rational, Side, enclosures};
 use elbowroom_plan::ParametrizedPlan;
 
 use super::concave_maximum::{CaseContext, approximate_optimum, power_of_ten, shorten_digits};
-use super::objective::Outcome;
-use super::master::{Master, Solved, Span};
 use super::log_probability::LogProbability;
-use super::{BestSettings, LOG_OF_ZERO, BoundSource, Variables};
+use super::master::{Master, Solved, Span};
+use super::objective::Outcome;
+use super::{BestSettings, BoundSource, LOG_OF_ZERO, Variables};
 
 /// One parameter.
 struct Term {
@@ -73,7 +75,10 @@ impl Probability {
             }
         }
         let even = variables.scales.iter().map(Rational::reciprocal);
-        let counted = variables.scales.iter().map(|scale| scale * &settings.max_deviation);
+        let counted = variables
+            .scales
+            .iter()
+            .map(|scale| scale * &settings.max_deviation);
         Self {
             terms,
             max_counted: counted.collect(),
@@ -101,7 +106,10 @@ impl Probability {
                 });
             }
         }
-        let spans = limits.into_iter().zip(&variables.max_distances).zip(&self.max_counted);
+        let spans = limits
+            .into_iter()
+            .zip(&variables.max_distances)
+            .zip(&self.max_counted);
         spans
             .map(|(((least, most), limit), counted)| {
                 let gains = most.flatten().unwrap_or_else(|| counted.clone());
@@ -182,7 +190,11 @@ impl Probability {
         let mut best: Option<TangentBound> = None;
         for at in guess.iter().chain([&at]) {
             let (touches, slopes) = self.tangents(case.spans, at);
-            match master.solve(case.chosen, case.spans, &self.coefficients(variables, &slopes)) {
+            match master.solve(
+                case.chosen,
+                case.spans,
+                &self.coefficients(variables, &slopes),
+            ) {
                 Solved::Impossible(proof) => return Outcome::Impossible(proof),
                 Solved::Best {
                     values: corner,
@@ -249,17 +261,28 @@ impl Probability {
                                 *slope += gain.checked_div(place)?;
                             }
                         }
-                        Some((TangentPoint::At(at), slopes.map(|slope| round_slope(&slope))))
+                        Some((
+                            TangentPoint::At(at),
+                            slopes.map(|slope| round_slope(&slope)),
+                        ))
                     }
                     LogConcaveDistribution::Values(_) => {
-                        let soft =
-                            LogProbability::new(chance, (&term.nominal, &term.scale), &cell, term.ends);
+                        let soft = LogProbability::new(
+                            chance,
+                            (&term.nominal, &term.scale),
+                            &cell,
+                            term.ends,
+                        );
                         let (mass, slopes) = soft.hull_at(&at)?;
-                        Some((TangentPoint::Mass(mass), slopes.map(|slope| round_slope(&slope))))
+                        Some((
+                            TangentPoint::Mass(mass),
+                            slopes.map(|slope| round_slope(&slope)),
+                        ))
                     }
                 }
             });
-            let (touch, own) = own.unwrap_or((TangentPoint::NoContact, [Rational::ZERO, Rational::ZERO]));
+            let (touch, own) =
+                own.unwrap_or((TangentPoint::NoContact, [Rational::ZERO, Rational::ZERO]));
             touches.push(touch);
             slopes.extend(own);
         }
@@ -279,7 +302,11 @@ impl Probability {
 
     /// Returns, for each parameter, an upper bound on the difference of the logarithm of its
     /// interval's probability and the linear function with these slopes.
-    fn gap_bounds(&self, spans: &[Span], (slopes, touches): (&[Rational], &[TangentPoint])) -> Vec<Rational> {
+    fn gap_bounds(
+        &self,
+        spans: &[Span],
+        (slopes, touches): (&[Rational], &[TangentPoint]),
+    ) -> Vec<Rational> {
         let terms = self.terms.iter().zip(slopes.chunks(2)).zip(touches);
         terms
             .map(|((term, slopes), touch)| {
@@ -290,7 +317,8 @@ impl Probability {
                 let slopes = [slopes[0].clone(), slopes[1].clone()];
                 let height = chance.gap(&term.nominal, &cell, touch, &slopes);
                 height.unwrap_or_else(|| {
-                    let nowhere = chance.gap(&term.nominal, &cell, &TangentPoint::NoContact, &slopes);
+                    let nowhere =
+                        chance.gap(&term.nominal, &cell, &TangentPoint::NoContact, &slopes);
                     nowhere.unwrap_or_default()
                 })
             })
@@ -299,13 +327,19 @@ impl Probability {
 
     /// Returns the variable and the value to split a case at: the jump with the largest gap between
     /// its partial count and its probability.
-    pub(super) fn split_point(&self, spans: &[Span], touches: &[TangentPoint]) -> Option<(usize, Rational)> {
+    pub(super) fn split_point(
+        &self,
+        spans: &[Span],
+        touches: &[TangentPoint],
+    ) -> Option<(usize, Rational)> {
         let mut widest: Option<(f64, usize, Rational)> = None;
         for (term, touch) in self.terms.iter().zip(touches) {
             let Some(chance) = &term.chance else { continue };
             let own = cell(term, spans);
             let place = match chance {
-                LogConcaveDistribution::Dense(dense) => largest_partial_cut(term, dense, &own, touch),
+                LogConcaveDistribution::Dense(dense) => {
+                    largest_partial_cut(term, dense, &own, touch)
+                }
                 LogConcaveDistribution::Values(values) => median_jump(term, chance, values, &own),
             };
             if let Some((gap, side, place)) = place

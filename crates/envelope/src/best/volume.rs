@@ -13,10 +13,10 @@ use std::ops::ControlFlow;
 use elbowroom_num::{Rational, enclosures};
 use elbowroom_plan::{ParametrizedPlan, Side};
 
-use super::concave_maximum::{CaseContext, approximate_optimum, power_of_ten, shorten_digits};
 use super::barrier::Concave;
-use super::objective::Outcome;
+use super::concave_maximum::{CaseContext, approximate_optimum, power_of_ten, shorten_digits};
 use super::master::{Master, Solved};
+use super::objective::Outcome;
 use super::{BoundSource, Variables};
 
 /// One parameter.
@@ -127,7 +127,9 @@ impl Volume {
         let worths = self.coefficients(variables, &near);
         let values = master.best_within(case, (Side::Upper, &guess), &worths);
         let values = values.map(|values| {
-            let values = shorten_digits(values, master, variables, case, &|own| self.lower_value(own));
+            let values = shorten_digits(values, master, variables, case, &|own| {
+                self.lower_value(own)
+            });
             // Fills the room that rounding has left, and moves variables that do not change the
             // objective.
             let filled = master.best_within(case, (Side::Lower, &values), &worths);
@@ -177,7 +179,11 @@ impl Volume {
 
     /// Returns the slope of each parameter's tangent at these values.
     fn slopes(&self, values: &[Rational]) -> Vec<Rational> {
-        let all = self.widths.iter().zip(&self.grids).zip(self.offset_widths(values));
+        let all = self
+            .widths
+            .iter()
+            .zip(&self.grids)
+            .zip(self.offset_widths(values));
         all.map(|((width, grid), footed)| {
             let slope = width.weight.checked_div(&(footed * &width.scale));
             let steps = slope.and_then(|slope| slope.checked_div(grid));

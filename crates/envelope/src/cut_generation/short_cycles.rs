@@ -214,7 +214,11 @@ fn fixed_pairs(reader: &Reader<'_>, origin: NodeId) -> Vec<(NodeId, Chord, Chord
 }
 
 /// Returns the steps of a cycle with their lengths; `None` if one of them is infinite.
-fn measure(reader: &Reader<'_>, cycle: &[RefutationPath], envelope: &DecoupledEnvelope) -> Option<Vec<Step>> {
+fn measure(
+    reader: &Reader<'_>,
+    cycle: &[RefutationPath],
+    envelope: &DecoupledEnvelope,
+) -> Option<Vec<Step>> {
     let network = &reader.network.network;
     let step = |part: &Part| {
         let to = match part {

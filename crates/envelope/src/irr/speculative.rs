@@ -12,13 +12,13 @@ use std::sync::Arc;
 use elbowroom_num::{End, Interval, Rational};
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan};
 
-use super::parameter_bounds::ParameterBounds;
 use super::conflict_split::ConflictSplit;
+use super::parameter_bounds::ParameterBounds;
 use super::{MAX_UNDECIDED, Settings, StopReason, Widening, max_reach};
 use crate::cut::Cut;
-use crate::frontier::Frontier;
-use crate::cut_pool::CutPool;
 use crate::cut_generation::CheckOutcome;
+use crate::cut_pool::CutPool;
+use crate::frontier::Frontier;
 use crate::objection::Objection;
 use crate::obligations::Refusal;
 use crate::oracle::Oracle;
@@ -377,5 +377,7 @@ enum Verification {
 /// Returns the reach of an end after a step; `None` if it is outside its parameter's range.
 fn next_reach(from: &Rational, end: BoxEnd, range: &Interval, step: &Rational) -> Option<Rational> {
     let reach = from + step;
-    range.contains(&end.side.value_at_reach(&reach)).then_some(reach)
+    range
+        .contains(&end.side.value_at_reach(&reach))
+        .then_some(reach)
 }

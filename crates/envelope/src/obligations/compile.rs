@@ -1,8 +1,8 @@
 //! Symbolic execution of a plan.
 
+mod autonomous;
 mod changes;
 mod guards;
-mod autonomous;
 
 use std::cell::OnceCell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -11,9 +11,9 @@ use std::sync::Arc;
 use elbowroom_model::Task;
 use elbowroom_model::ground::{Body, Condition, Expression, SnapAction};
 
+use autonomous::{AutonomousModel, Occurrence};
 use changes::record;
 use guards::{GuardId, GuardPart, effects};
-use autonomous::{AutonomousModel, Occurrence};
 
 use super::dnf::{Alternatives, WantedTruth, compared};
 use super::goal::goal_cases;

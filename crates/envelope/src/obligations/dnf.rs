@@ -163,7 +163,10 @@ pub(crate) fn compared(
         (Comparison::Equal, true) => vec![[below(false), above(false)].concat()],
         (Comparison::Equal, false) => vec![below(true), above(true)],
     };
-    alternatives.into_iter().filter_map(drop_constants).collect()
+    alternatives
+        .into_iter()
+        .filter_map(drop_constants)
+        .collect()
 }
 
 /// Drops inequalities between constants that hold. Returns `None` if one does not.

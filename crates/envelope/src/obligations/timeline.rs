@@ -140,7 +140,8 @@ impl Timeline {
         let mut open = BTreeSet::new();
         for fact in facts {
             if let Some(history) = self.facts.get(fact) {
-                near.facts.insert(*fact, history.relevant_part_of_history(around, &mut open));
+                near.facts
+                    .insert(*fact, history.relevant_part_of_history(around, &mut open));
             }
         }
         for fluent in fluents {
@@ -200,7 +201,11 @@ impl FactHistory {
     ///
     /// Events that make a fact true and events that make it false interfere. So if an event of each
     /// kind is known to come after the moment, so are all later ones.
-    fn relevant_part_of_history(&self, around: &mut Around<'_>, open: &mut BTreeSet<NodeId>) -> Self {
+    fn relevant_part_of_history(
+        &self,
+        around: &mut Around<'_>,
+        open: &mut BTreeSet<NodeId>,
+    ) -> Self {
         let here = self
             .events
             .partition_point(|(node, _)| around.is_not_after_start(*node));

@@ -5,8 +5,8 @@ use elbowroom_plan::{BoxEnd, DecoupledEnvelope};
 
 use super::{CheckScope, Oracle};
 use crate::cut::{Cut, Ground};
-use crate::cut_pool::CutPool;
 use crate::cut_generation::CheckOutcome;
+use crate::cut_pool::CutPool;
 use crate::objection::Objection;
 use crate::obligations::Refusal;
 use crate::row::Row;
@@ -33,7 +33,9 @@ impl Oracle {
             return Ok(CheckOutcome::Unknown);
         }
         // The cut of a condition is only valid if all values have a schedule.
-        let learnt = self.controllability.generate_cuts(&self.plan, envelope, most)?;
+        let learnt = self
+            .controllability
+            .generate_cuts(&self.plan, envelope, most)?;
         if learnt != CheckOutcome::Accepted || self.scope == CheckScope::TimesOnly {
             self.proofs_hold_in_last = learnt == CheckOutcome::Accepted;
             return Ok(learnt);

@@ -165,7 +165,8 @@ impl DefectFinder<'_> {
         schedule: &Schedule,
         decided: &BTreeSet<(NodeId, NodeId)>,
     ) -> Result<Option<Defect>, Refusal> {
-        let Some(found) = moment::avoiding_alternatives(self.task, &self.plan.plan, over_all, values, schedule)?
+        let Some(found) =
+            moment::avoiding_alternatives(self.task, &self.plan.plan, over_all, values, schedule)?
         else {
             return Ok(None);
         };

@@ -8,7 +8,7 @@ use elbowroom_plan::{
     Bound, Node, NodeId, ParameterId, ParametrizedPlan, Schedule, Side, Valuation,
 };
 
-use super::{Changeable, BindingConstraint};
+use super::{BindingConstraint, Changeable};
 use crate::linear::Linear;
 use crate::obligations::Refusal;
 
@@ -150,7 +150,9 @@ impl<'a> Program<'a> {
                         .assert_upper(variable, Delta::from(room), tag);
                 }
                 value.terms.push((variable, Rational::from(sign)));
-                program.negated_cost.extend(cost.map(|cost| (variable, -cost)));
+                program
+                    .negated_cost
+                    .extend(cost.map(|cost| (variable, -cost)));
             };
         let between = |low: Option<&Rational>, high: Option<&Rational>| Some(high? - low?);
         let weight = Some(&own.weight);
@@ -292,7 +294,8 @@ impl<'a> Program<'a> {
         let because = named(&self.hindrances, proof);
         // At that cost, everything as early as possible.
         let tag = self.tag(BindingConstraint::TimeZero);
-        self.simplex.assert_lower(self.negated_cost_variable, gain.clone(), tag);
+        self.simplex
+            .assert_lower(self.negated_cost_variable, gain.clone(), tag);
         self.simplex
             .maximize(&self.earliness)
             .expect("the optimum just found is feasible");

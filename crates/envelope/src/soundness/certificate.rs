@@ -1,6 +1,6 @@
 //! Proofs that a bad case is impossible, and their dependence on a box.
 
-use elbowroom_num::{Delta, Rational, Accumulator};
+use elbowroom_num::{Accumulator, Delta, Rational};
 
 use crate::reduction::Edge;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope};

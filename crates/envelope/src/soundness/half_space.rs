@@ -78,9 +78,9 @@ impl Soundness {
                     // The moment is only close to the event, so the bound itself need not be
                     // reached.
                     let row = row(&expression, true)?;
-                    let is_possible = widest
-                        .is_some_and(|network| self.can_be_near_event(network, case, moment, event))
-                        || self.is_possible(plan, case, &row, moment, event);
+                    let is_possible = widest.is_some_and(|network| {
+                        self.can_be_near_event(network, case, moment, event)
+                    }) || self.is_possible(plan, case, &row, moment, event);
                     is_possible.then_some(row)
                 })
             }

@@ -2,9 +2,9 @@
 
 use elbowroom_model::Task;
 
+use super::proof::{Proof, ProofResult, Prover};
+use super::scale::{ExactScale, IntegerScale, Numbers};
 use super::violation_case::{Outcome, Schedules};
-use super::proof::{ProofResult, Proof, Prover};
-use super::scale::{ExactScale, Numbers, IntegerScale};
 use crate::obligations::{BadCase, Obligations, OverAll, Refusal};
 use crate::reduction::Reduction;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan};
@@ -21,7 +21,8 @@ impl<'a> LazyNetwork<'a> {
     /// Returns the network; `None` if the box has no schedule.
     pub(crate) fn get(&mut self) -> Option<&mut AnySchedules<'a>> {
         if let Self::Unbuilt(reduction, envelope, numbers) = *self {
-            *self = AnySchedules::new(reduction, envelope, numbers).map_or(Self::Empty, Self::Built);
+            *self =
+                AnySchedules::new(reduction, envelope, numbers).map_or(Self::Empty, Self::Built);
         }
         match self {
             Self::Built(schedules) => Some(schedules),

@@ -6,8 +6,8 @@ use elbowroom_num::simplex::{Simplex, VariableId};
 use elbowroom_num::{Delta, Rational};
 use elbowroom_stn::Constraint;
 
-use super::violation_case::add_times;
 use super::certificate::{Certificate, Term};
+use super::violation_case::add_times;
 use crate::linear::Linear;
 use crate::obligations::Inequality;
 use crate::reduction::Reduction;

@@ -4,9 +4,9 @@ use std::borrow::Cow;
 
 use elbowroom_model::Task;
 
-use super::violation_case::{Outcome, Schedules};
 use super::certificate::Certificate;
 use super::scale::Scale;
+use super::violation_case::{Outcome, Schedules};
 use crate::obligations::{BadCase, Difference, OverAll, Refusal};
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, NodeId, ParameterId, ParametrizedPlan};
 

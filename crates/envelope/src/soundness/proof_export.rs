@@ -7,12 +7,12 @@ use elbowroom_num::Rational;
 use elbowroom_plan::{Bound, DecoupledEnvelope, NodeId, Origin, ParameterId, ParametrizedPlan};
 
 use super::Soundness;
-use super::violation_case::Outcome;
 use super::certificate::{Certificate, Term};
 use super::lazy_network::AnySchedules;
 use super::proof::Proof;
+use super::violation_case::Outcome;
 use crate::obligations::{Difference, Inequality, OverAll, Requirement};
-use crate::proof::{ConditionProof, RefutedCase, Refutation, Summand, ImpossibilityProof};
+use crate::proof::{ConditionProof, ImpossibilityProof, Refutation, RefutedCase, Summand};
 use crate::reduction::Reduction;
 
 impl Soundness {
@@ -108,7 +108,10 @@ impl ProofExporter<'_> {
     /// Returns, for each combination of ends of multiplied parameters, the position of its proof
     /// and the values there. The last parameter's ends vary slowest. Equal ends share a proof.
     /// Returns none if an end is infinite.
-    fn corner_values(&self, corners: &[ParameterId]) -> Vec<(usize, BTreeMap<ParameterId, Rational>)> {
+    fn corner_values(
+        &self,
+        corners: &[ParameterId],
+    ) -> Vec<(usize, BTreeMap<ParameterId, Rational>)> {
         let mut places = vec![(0, BTreeMap::new())];
         for &parameter in corners {
             let interval = self.envelope.interval(parameter);
@@ -227,7 +230,11 @@ impl ProofExporter<'_> {
                 place.known.push(Difference::before(moment, event));
                 let before = self.place((over_all, events), index + 1, place, before)?;
                 place.known.pop();
-                Some(ImpossibilityProof::Split(event, Box::new(after), Box::new(before)))
+                Some(ImpossibilityProof::Split(
+                    event,
+                    Box::new(after),
+                    Box::new(before),
+                ))
             }
             Proof::True(cases) => {
                 let cut = |node: NodeId| place.happened.contains(&node);
@@ -290,7 +297,9 @@ impl Rigid {
                 }
             }
         }
-        Self { computed_from: reckoned }
+        Self {
+            computed_from: reckoned,
+        }
     }
 
     /// Adds the constraints that cancel the times left in a sum.

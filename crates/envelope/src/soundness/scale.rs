@@ -137,7 +137,7 @@ impl Numbers {
 
 #[cfg(test)]
 mod tests {
-    use super::{Delta, Numbers, Rational, Scale, IntegerScale};
+    use super::{Delta, IntegerScale, Numbers, Rational, Scale};
     use crate::reduction::Reduction;
     use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan, StnPlan};
 

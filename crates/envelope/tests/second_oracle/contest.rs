@@ -16,9 +16,9 @@ use elbowroom_plan::{
 };
 
 use crate::case::{Case, show};
-use crate::random::Random;
 use crate::generate::sample;
 use crate::plain::{self, Answer, GaveUp};
+use crate::random::Random;
 use crate::smt::{Encoding, Places, contained};
 use crate::system::System;
 use crate::z3::{Found, Z3};
@@ -188,7 +188,11 @@ pub(crate) fn steps(dice: &mut Random, parameters: &[Parameter], length: usize) 
 }
 
 /// Generates a box near the nominal point, usually one that contains it.
-fn random_box(dice: &mut Random, nominal: &Valuation, parameters: &[Parameter]) -> DecoupledEnvelope {
+fn random_box(
+    dice: &mut Random,
+    nominal: &Valuation,
+    parameters: &[Parameter],
+) -> DecoupledEnvelope {
     let mut envelope = DecoupledEnvelope::point(nominal);
     let is_around = dice.chance(75);
     for (index, parameter) in parameters.iter().enumerate() {

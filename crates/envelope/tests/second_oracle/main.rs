@@ -13,7 +13,6 @@
 mod benchmarks;
 mod case;
 mod contest;
-mod random;
 mod generate;
 #[path = "../../../elbowroom/tests/shared/instances.rs"]
 #[allow(dead_code, reason = "only some figures are asked about")]
@@ -21,6 +20,7 @@ mod instances;
 mod numbers;
 mod plain;
 mod polynomial;
+mod random;
 mod schedules;
 mod shrink;
 #[path = "../../../../testing/skipped.rs"]
@@ -30,8 +30,8 @@ mod system;
 mod z3;
 
 use contest::{Mismatch, Script, Tally, steps};
-use random::Random;
 use generate::generate;
+use random::Random;
 use skipped::skipped;
 use z3::Z3;
 

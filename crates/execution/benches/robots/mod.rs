@@ -7,7 +7,8 @@ use std::sync::Arc;
 
 use elbowroom_execution::executors::ExecutorSpec;
 use elbowroom_execution::{
-    Decision, Ending, Executor, DispatchableCache, PreparedPlan, DecisionContext, PlanEvent, BeliefState, RegionOracle, StepId,
+    BeliefState, Decision, DecisionContext, DispatchableCache, Ending, Executor, PlanEvent,
+    PreparedPlan, RegionOracle, StepId,
 };
 use elbowroom_model::ground::{Action, Body, Condition, DurativeBody, SnapAction};
 use elbowroom_model::problem::SchemaId;
@@ -95,7 +96,12 @@ impl Events {
 pub(crate) struct UnlimitedRegion;
 
 impl RegionOracle for UnlimitedRegion {
-    fn find_violation(&mut self, _: &Arc<Task>, _: &ParametrizedPlan, _: &Valuation) -> Option<String> {
+    fn find_violation(
+        &mut self,
+        _: &Arc<Task>,
+        _: &ParametrizedPlan,
+        _: &Valuation,
+    ) -> Option<String> {
         None
     }
 }

@@ -46,16 +46,20 @@ impl BeliefState {
             Change::Update { fluent, value, .. } => {
                 match measured.iter().find(|measured| measured.fluent == *fluent) {
                     Some(measured) => Ok(measured.amount.clone()),
-                    None => {
-                        evaluation::evaluate(value, duration, &|fluent| self.value_on_arrival(fluent))
-                    }
+                    None => evaluation::evaluate(value, duration, &|fluent| {
+                        self.value_on_arrival(fluent)
+                    }),
                 }
             }
         };
         (change, amount)
     }
 
-    pub(super) fn apply(&mut self, change: &Change, amount: &Rational) -> Result<(), EvaluationError> {
+    pub(super) fn apply(
+        &mut self,
+        change: &Change,
+        amount: &Rational,
+    ) -> Result<(), EvaluationError> {
         match change {
             Change::Add(fact) => self.set_fact(*fact, true),
             Change::Delete(fact) => self.set_fact(*fact, false),
@@ -89,6 +93,8 @@ fn updated(
         UpdateOperator::Increase => old + amount,
         UpdateOperator::Decrease => old - amount,
         UpdateOperator::ScaleUp => old * amount,
-        UpdateOperator::ScaleDown => old.checked_div(amount).ok_or(EvaluationError::DivisionByZero)?,
+        UpdateOperator::ScaleDown => old
+            .checked_div(amount)
+            .ok_or(EvaluationError::DivisionByZero)?,
     })
 }

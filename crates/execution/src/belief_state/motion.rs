@@ -158,8 +158,13 @@ impl Fraction {
 
     /// Returns the fraction as a polynomial, if its denominator is constant.
     fn as_polynomial(&self) -> Result<Polynomial, EvaluationError> {
-        let divisor = self.denominator.as_constant().ok_or(EvaluationError::Quotient)?;
-        let factor = divisor.reciprocal().ok_or(EvaluationError::DivisionByZero)?;
+        let divisor = self
+            .denominator
+            .as_constant()
+            .ok_or(EvaluationError::Quotient)?;
+        let factor = divisor
+            .reciprocal()
+            .ok_or(EvaluationError::DivisionByZero)?;
         Ok(self.numerator.scaled(&factor))
     }
 }

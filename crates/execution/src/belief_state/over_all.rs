@@ -12,7 +12,7 @@ use elbowroom_num::Rational;
 
 use super::motion::{Fraction, Motion};
 use super::polynomial::{Cell, cells};
-use super::{BeliefState, RunningActionState, EvaluationError};
+use super::{BeliefState, EvaluationError, RunningActionState};
 use crate::event::ActionHandle;
 
 /// A span of time after the present happening group.
@@ -39,7 +39,10 @@ impl BeliefState {
     /// present moment counts as well.
     pub fn failing_actions(&self) -> Vec<(ActionHandle, Vec<&Condition>)> {
         let motion = self.motion().unwrap_or_default();
-        let lost = self.violated_conditions(&motion, Span::JustAfter).conditions.into_iter();
+        let lost = self
+            .violated_conditions(&motion, Span::JustAfter)
+            .conditions
+            .into_iter();
         let breaking = lost.filter_map(|(ticket, parts)| {
             let body = self.running.get(&ticket)?.action.durative()?;
             let conjuncts = body.over_all.conjuncts();
@@ -52,7 +55,9 @@ impl BeliefState {
     /// Returns `true` if an over-all condition fails from now on that has not failed before.
     pub fn is_over_all_failing(&self) -> bool {
         let motion = self.motion().unwrap_or_default();
-        let lost = self.violated_conditions(&motion, Span::JustAfter).conditions;
+        let lost = self
+            .violated_conditions(&motion, Span::JustAfter)
+            .conditions;
         let is_new = |(ticket, parts): &(ActionHandle, Vec<usize>)| {
             let underway = self.running.get(ticket);
             underway.is_some_and(|it| parts.iter().any(|part| !it.broken.contains(part)))
@@ -207,7 +212,11 @@ impl CellView<'_> {
         found
     }
 
-    fn difference(&self, left: &Expression, right: &Expression) -> Result<Fraction, EvaluationError> {
+    fn difference(
+        &self,
+        left: &Expression,
+        right: &Expression,
+    ) -> Result<Fraction, EvaluationError> {
         let now = |fluent| {
             let value = self.state.value(fluent).cloned();
             value.ok_or(EvaluationError::Undefined(fluent))

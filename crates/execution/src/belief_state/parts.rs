@@ -7,7 +7,7 @@ use elbowroom_model::ground::{Action, Body, Condition, FactId, FluentId, Guard};
 use elbowroom_model::{RunningAction, Task};
 use elbowroom_num::{Interval, Rational};
 
-use super::{Doubt, BeliefState, RunningActionState, decide_guards};
+use super::{BeliefState, Doubt, RunningActionState, decide_guards};
 use crate::event::ActionHandle;
 
 /// A [`Progression`] without its task and without the actions of its running instances.

@@ -4,12 +4,16 @@ use elbowroom_model::ground::{Action, Body, Condition, DurationConstraint, Expre
 use elbowroom_num::Rational;
 
 use super::BeliefState;
-use super::polynomial::{Cell, cells};
 use super::over_all::CellView;
+use super::polynomial::{Cell, cells};
 
 impl BeliefState {
     /// Returns the numeric part of an action's start condition, with the bounds on its duration.
-    pub(crate) fn numeric_start_condition(&self, action: &Action, duration: &Rational) -> Condition {
+    pub(crate) fn numeric_start_condition(
+        &self,
+        action: &Action,
+        duration: &Rational,
+    ) -> Condition {
         let snap = match &action.body {
             Body::Instantaneous(snap) => snap,
             Body::Durative(body) => &body.start,
@@ -71,8 +75,9 @@ impl BeliefState {
     pub(crate) fn is_moving(&self, condition: &Condition) -> bool {
         let motion = self.motion().unwrap_or_default();
         let mut is_moving = false;
-        self.task
-            .visit_fluents_of(condition, &mut |fluent| is_moving |= motion.is_changing(fluent));
+        self.task.visit_fluents_of(condition, &mut |fluent| {
+            is_moving |= motion.is_changing(fluent)
+        });
         is_moving
     }
 }

@@ -8,10 +8,10 @@ use elbowroom_plan::{InstanceId, Node, NodeId, network_node};
 use elbowroom_stn::WindowEnd;
 
 use super::{Dispatch, explain, is_instantaneous};
-use crate::executor::{Decided, Decision, PreparedPlan, DecisionContext, Order, StepId};
+use crate::belief_state::{BeliefState, GoalStatus, conditions_on_duration};
+use crate::executor::{Decided, Decision, DecisionContext, Order, PreparedPlan, StepId};
+use crate::reason::{Cause, Reason, Subject};
 use crate::window_propagation::WindowPropagation;
-use crate::belief_state::{GoalStatus, BeliefState, conditions_on_duration};
-use crate::reason::{Subject, Cause, Reason};
 
 /// Instance that was commanded and may be running, although its start was not reported.
 struct UnreportedStart {
@@ -26,7 +26,10 @@ impl Dispatch {
         if self.progress.remaining == 0 {
             return decide_when_done(moment);
         }
-        if let Some(reason) = self.overdue_reason(moment).or_else(|| violated_over_all_condition(moment)) {
+        if let Some(reason) = self
+            .overdue_reason(moment)
+            .or_else(|| violated_over_all_condition(moment))
+        {
             return replan(reason);
         }
         self.decide_without_checks(moment)
@@ -139,7 +142,8 @@ impl Dispatch {
         }
         let mut reason = Reason::new(Cause::Due);
         reason.action = orders.first().map(|order| order.action.name.clone());
-        reason.about = first.and_then(|id| self.failure_subject(self.start_and_end_nodes(id)[0], None));
+        reason.about =
+            first.and_then(|id| self.failure_subject(self.start_and_end_nodes(id)[0], None));
         Decided {
             decision: Decision::Start(orders),
             reason,
@@ -317,7 +321,10 @@ pub(super) fn numeric_duration_bounds(
     let steps = steps.zip(&mission.instances).filter_map(|(step, &id)| {
         let planned = mission.plan.plan.instance(id).action.durative()?;
         let body = step.action.durative()?;
-        let bounds = body.duration.iter().filter(|bound| reads_only_fluents(bound));
+        let bounds = body
+            .duration
+            .iter()
+            .filter(|bound| reads_only_fluents(bound));
         let bounds: Vec<_> = bounds.cloned().collect();
         (planned.duration.is_empty() && !bounds.is_empty()).then_some((id, bounds))
     });

@@ -6,8 +6,8 @@ use elbowroom_plan::{InstanceId, NodeId, StnPlan, network_node};
 use elbowroom_stn::WindowEnd;
 
 use super::{Bounds, Dispatch};
-use crate::window_propagation::NetworkLimit;
 use crate::reason::{Evidence, TimedChange};
+use crate::window_propagation::NetworkLimit;
 
 /// Number of constraints of a long chain that are named.
 const MAX_NAMED_CONSTRAINTS: usize = 4;

@@ -8,8 +8,8 @@ use super::projection;
 use super::{Dispatch, explain};
 use crate::event::Ending;
 use crate::executor::{DecisionContext, PlanEvent, StepId};
-use crate::window_propagation::{WindowPropagation, Missed};
-use crate::reason::{Subject, Evidence, Cause, Reason};
+use crate::reason::{Cause, Evidence, Reason, Subject};
+use crate::window_propagation::{Missed, WindowPropagation};
 
 impl Dispatch {
     /// Processes the news. Returns the first one that makes the plan infeasible, if any.
@@ -33,9 +33,11 @@ impl Dispatch {
                 PlanEvent::Contradiction { action } => {
                     Some(Reason::new(Cause::Contradiction).for_action(action))
                 }
-                PlanEvent::TimedOut { action, since } => {
-                    Some(Reason::new(Cause::Silence).for_action(action).since(since.clone()))
-                }
+                PlanEvent::TimedOut { action, since } => Some(
+                    Reason::new(Cause::Silence)
+                        .for_action(action)
+                        .since(since.clone()),
+                ),
             };
             trouble = trouble.or(new);
         }
@@ -47,9 +49,14 @@ impl Dispatch {
 
     /// Returns the reason if the remaining plan fails in the current belief state when it is
     /// executed nominally. `what` is the unexpected fact or value.
-    pub(crate) fn unexpected_failure(&self, moment: &DecisionContext<'_>, what: &str) -> Option<Reason> {
+    pub(crate) fn unexpected_failure(
+        &self,
+        moment: &DecisionContext<'_>,
+        what: &str,
+    ) -> Option<Reason> {
         let failure = projection::simulate_remaining_plan(self, moment)?;
-        let mut reason = Reason::new(Cause::Surprise).about(Subject::ObservedValue(what.to_owned()));
+        let mut reason =
+            Reason::new(Cause::Surprise).about(Subject::ObservedValue(what.to_owned()));
         reason.action = failure.action;
         reason.evidence = vec![Evidence::Condition(failure.condition)];
         reason.since = Some(moment.now.clone());
@@ -101,7 +108,9 @@ impl Dispatch {
             }
             Ending::Cancelled => {
                 self.finish(id);
-                let reason = Reason::new(Cause::Failed).for_action(&name).about(Subject::Cancelled);
+                let reason = Reason::new(Cause::Failed)
+                    .for_action(&name)
+                    .about(Subject::Cancelled);
                 return Some(reason.since(time.clone()));
             }
         }

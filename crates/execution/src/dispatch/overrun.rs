@@ -54,7 +54,11 @@ impl Dispatch {
     /// The run time depends on the neighbours of the executed time points, not on the length of the
     /// plan. The check is incomplete: if it returns `false`, the remaining plan may still be
     /// feasible.
-    pub(crate) fn continue_if_executable(&mut self, now: &Rational, until: &dyn Fn(&Overdue) -> Vec<EndAssumption>) -> bool {
+    pub(crate) fn continue_if_executable(
+        &mut self,
+        now: &Rational,
+        until: &dyn Fn(&Overdue) -> Vec<EndAssumption>,
+    ) -> bool {
         if self.bound_violations.is_broken {
             return false;
         }
@@ -79,7 +83,9 @@ impl Dispatch {
                 let time = match time {
                     EndAssumption::AnyTime => None,
                     EndAssumption::By(time) => Some(time.clone()),
-                    EndAssumption::ByOrEarlier(time) => Some(self.horizon.latest_assumable_end(end, time, now)?),
+                    EndAssumption::ByOrEarlier(time) => {
+                        Some(self.horizon.latest_assumable_end(end, time, now)?)
+                    }
                 };
                 let does = self.horizon.assume_end_by(end, time.as_ref(), now);
                 does.then_some(time)
@@ -91,7 +97,10 @@ impl Dispatch {
             self.durations[id.index()] = (Some(now - begun), found.map(|time| time - begun));
         }
         let mut ends = self.bound_violations.ends.iter();
-        if !ends.all(|end| self.horizon.remains_executable_after(network_node(*end), now)) {
+        if !ends.all(|end| {
+            self.horizon
+                .remains_executable_after(network_node(*end), now)
+        }) {
             return false;
         }
         if self.first_missed_time_point(now).is_some() {

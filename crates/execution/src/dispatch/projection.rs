@@ -7,9 +7,9 @@ use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node, NodeId};
 
 use super::{Dispatch, in_words, is_instantaneous};
+use crate::belief_state::BeliefState;
 use crate::event::ActionHandle;
 use crate::executor::DecisionContext;
-use crate::belief_state::BeliefState;
 
 /// First failure in the simulation of a plan.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -25,7 +25,10 @@ const FIRST_SIMULATED_TICKET: u64 = 1 << 63;
 
 /// Simulates the remaining plan without further deviations. Returns the first condition that does
 /// not hold.
-pub(crate) fn simulate_remaining_plan(dispatch: &Dispatch, moment: &DecisionContext<'_>) -> Option<Failure> {
+pub(crate) fn simulate_remaining_plan(
+    dispatch: &Dispatch,
+    moment: &DecisionContext<'_>,
+) -> Option<Failure> {
     let mut state = moment.belief.clone();
     let mut running: Vec<(InstanceId, ActionHandle)> = Vec::new();
     for (time, node) in expected_happenings(dispatch, moment.now) {

@@ -2,8 +2,8 @@
 
 mod initial_belief;
 mod order_cache;
-mod repetitions;
 mod remaining_order;
+mod repetitions;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -15,11 +15,11 @@ use elbowroom_probability::{
 };
 
 use super::happening_choice::HappeningChooser;
-use super::{PolicyTableCache, ExecutorEntry};
+use super::{ExecutorEntry, PolicyTableCache};
 use crate::dispatch::replan;
 use crate::executor::PlanForm;
-use crate::executor::{Decided, Executor, PreparedPlan, DecisionContext, Planned, StepId};
-use crate::reason::{Subject, Cause, Reason};
+use crate::executor::{Decided, DecisionContext, Executor, Planned, PreparedPlan, StepId};
+use crate::reason::{Cause, Reason, Subject};
 use initial_belief::InitialBelief;
 pub use order_cache::OrderCache;
 use remaining_order::RemainingOrder;
@@ -74,7 +74,12 @@ impl Executor for Adaptable {
             Some(tabulated) => tabulated,
             None => self.order_policy(mission)?,
         };
-        self.state = Some(RemainingOrder::new(mission, chooser, steps, &self.likelihoods));
+        self.state = Some(RemainingOrder::new(
+            mission,
+            chooser,
+            steps,
+            &self.likelihoods,
+        ));
         Ok(())
     }
 
@@ -107,7 +112,10 @@ impl Executor for Adaptable {
 
 impl Adaptable {
     /// Creates `lookahead`.
-    pub(super) fn with_policy_tables(likelihoods: Arc<Likelihoods>, foresight: PolicyTableCache) -> Self {
+    pub(super) fn with_policy_tables(
+        likelihoods: Arc<Likelihoods>,
+        foresight: PolicyTableCache,
+    ) -> Self {
         Self {
             initial: InitialBelief::of(&likelihoods),
             likelihoods,
@@ -148,7 +156,10 @@ impl Adaptable {
     }
 
     /// Returns the search for orders of a plan, with its steps.
-    fn order_policy(&self, mission: &PreparedPlan) -> Result<(HappeningChooser, Vec<Step>), Box<Reason>> {
+    fn order_policy(
+        &self,
+        mission: &PreparedPlan,
+    ) -> Result<(HappeningChooser, Vec<Step>), Box<Reason>> {
         let looks_ahead = self.policy_tables.is_some();
         let Some(plan) = mission.order.clone() else {
             let reason = Reason::new(Cause::NoOrder).about(Subject::NoPartialOrder);

@@ -8,8 +8,10 @@ use super::ExecutorEntry;
 use crate::dispatch::{Bounds, Dispatch, PropagationReach, replan};
 use crate::event::Ending;
 use crate::executor::PlanForm;
-use crate::executor::{Decided, Executor, PreparedPlan, DecisionContext, PlanEvent, Planned, StepId};
-use crate::reason::{Subject, Cause, Reason};
+use crate::executor::{
+    Decided, DecisionContext, Executor, PlanEvent, Planned, PreparedPlan, StepId,
+};
+use crate::reason::{Cause, Reason, Subject};
 
 pub(super) const REGISTERED: ExecutorEntry = ExecutorEntry {
     name: "esterel",
@@ -48,8 +50,8 @@ impl Executor for Esterel {
         };
         // The orderings hold for planned durations; real durations may bring an end close to a
         // start.
-        let dispatch =
-            Dispatch::new(mission, PropagationReach::WholeNetwork, &bounds)?.with_separation(&Rational::ZERO);
+        let dispatch = Dispatch::new(mission, PropagationReach::WholeNetwork, &bounds)?
+            .with_separation(&Rational::ZERO);
         self.dispatch = Some(dispatch);
         Ok(())
     }
@@ -80,7 +82,10 @@ impl Executor for Esterel {
 
 /// Continues with a plan by its orderings alone. Returns `None` if they contradict each other after
 /// the events so far.
-pub(super) fn continue_by_orderings(mut dispatch: Dispatch, now: &Rational) -> Option<Box<dyn Executor>> {
+pub(super) fn continue_by_orderings(
+    mut dispatch: Dispatch,
+    now: &Rational,
+) -> Option<Box<dyn Executor>> {
     let local = dispatch.to_plan_time(now);
     let plan = dispatch.plan().clone();
     let is_timed = |node: NodeId| matches!(plan.nodes[node.index()], Node::Timed(_));
@@ -128,10 +133,14 @@ fn learn(dispatch: &mut Dispatch, news: &PlanEvent) -> Option<Reason> {
         }
         // Conditions are only checked when an action is started.
         PlanEvent::Fact(_) | PlanEvent::Value(_) => None,
-        PlanEvent::Contradiction { action } => Some(Reason::new(Cause::Contradiction).for_action(action)),
-        PlanEvent::TimedOut { action, since } => {
-            Some(Reason::new(Cause::Silence).for_action(action).since(since.clone()))
+        PlanEvent::Contradiction { action } => {
+            Some(Reason::new(Cause::Contradiction).for_action(action))
         }
+        PlanEvent::TimedOut { action, since } => Some(
+            Reason::new(Cause::Silence)
+                .for_action(action)
+                .since(since.clone()),
+        ),
     }
 }
 

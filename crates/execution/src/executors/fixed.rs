@@ -6,9 +6,9 @@ use elbowroom_plan::{Bound, Constraint, Node, NodeId, Schedule, StnPlan};
 use super::ExecutorEntry;
 use crate::dispatch::{Bounds, Dispatch, PropagationReach, constant_bounds, replan};
 use crate::executor::PlanForm;
-use crate::executor::{Decided, Executor, PreparedPlan, DecisionContext, Planned, StepId};
+use crate::executor::{Decided, DecisionContext, Executor, Planned, PreparedPlan, StepId};
 use crate::measured_amounts::amounts;
-use crate::reason::{Subject, Cause, Reason};
+use crate::reason::{Cause, Reason, Subject};
 
 pub(super) const REGISTERED: ExecutorEntry = ExecutorEntry {
     name: "fixed",
@@ -113,8 +113,8 @@ impl Executor for Fixed {
         };
         // The orderings are those of facts alone, so numbers could be written and read at the same
         // time.
-        let dispatch =
-            Dispatch::new(mission, PropagationReach::OneHop, &bounds)?.with_separation(&Rational::ZERO);
+        let dispatch = Dispatch::new(mission, PropagationReach::OneHop, &bounds)?
+            .with_separation(&Rational::ZERO);
         self.state = Some((dispatch, mission.clone()));
         Ok(())
     }

@@ -8,10 +8,10 @@ use elbowroom_plan::{
 };
 use elbowroom_stn::ConsistentNetwork;
 
-use crate::dispatch::{Dispatch, Overdue, EndAssumption};
+use crate::dispatch::{Dispatch, EndAssumption, Overdue};
 use crate::executor::{PreparedPlan, StepId};
 use crate::measured_amounts::duration_parameters;
-use crate::reason::{Subject, Cause, GuaranteeLevel, Reason};
+use crate::reason::{Cause, GuaranteeLevel, Reason, Subject};
 
 /// Shares of the envelope around the planned values that are tried, in sixteenths. On a real clock
 /// each start is a little late; where the envelope has no slack to spare, a slightly smaller share
@@ -113,7 +113,11 @@ pub(super) fn strongest_guarantee(
     let local = dispatch.to_plan_time(now);
     // Numeric conditions are only guaranteed while no quantity has left the envelope.
     let is_unknown = !is_inside && reads_more_than_facts;
-    if !has_other_constraints && dispatch.continue_if_executable(&local, &|overdue| overdue_end_assumptions(rest, overdue, &local)) {
+    if !has_other_constraints
+        && dispatch.continue_if_executable(&local, &|overdue| {
+            overdue_end_assumptions(rest, overdue, &local)
+        })
+    {
         return Ok(if is_unknown {
             before.max(GuaranteeLevel::Planned)
         } else {
@@ -271,7 +275,11 @@ fn slack(
 
 /// Returns the assumptions about the end of an overdue action, on the plan's clock, the most
 /// general one first.
-fn overdue_end_assumptions(rest: &RemainingPlan<'_>, overdue: &Overdue, now: &Rational) -> Vec<EndAssumption> {
+fn overdue_end_assumptions(
+    rest: &RemainingPlan<'_>,
+    overdue: &Overdue,
+    now: &Rational,
+) -> Vec<EndAssumption> {
     let plan = &rest.prepared_plan.plan;
     if rest.is_inside
         && let Some(envelope) = &rest.prepared_plan.envelope
@@ -383,7 +391,8 @@ impl DurationAssumptions<'_> {
             _ if has_room => ConstraintRole::Contingent { lower, upper },
             Overrun::Unlimited => ConstraintRole::Contingent { lower, upper: None },
             Overrun::QuarterLonger => {
-                let quarter = quarter_of_planned(self.prepared_plan, &plan.parameter(parameter).nominal);
+                let quarter =
+                    quarter_of_planned(self.prepared_plan, &plan.parameter(parameter).nominal);
                 ConstraintRole::Contingent {
                     lower,
                     upper: Some(elapsed + quarter),

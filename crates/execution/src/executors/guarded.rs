@@ -5,10 +5,12 @@ use elbowroom_plan::{Constraint, DecoupledEnvelope, InstanceId, Valuation};
 
 use super::{ExecutorEntry, guarantee_status};
 use crate::dispatch::{Dispatch, replan};
-use crate::executor::{SUPPORTS_REAL_CLOCK, PlanForm};
-use crate::executor::{Decided, Decision, Executor, PreparedPlan, DecisionContext, Planned, StepId};
+use crate::executor::{
+    Decided, Decision, DecisionContext, Executor, Planned, PreparedPlan, StepId,
+};
+use crate::executor::{PlanForm, SUPPORTS_REAL_CLOCK};
 use crate::measured_amounts::{AmountEquation, amounts, duration_parameters};
-use crate::reason::{Subject, Cause, GuaranteeLevel, Reason};
+use crate::reason::{Cause, GuaranteeLevel, Reason, Subject};
 
 pub(super) const REGISTERED: ExecutorEntry = ExecutorEntry {
     name: "guarded",
@@ -185,7 +187,8 @@ impl GuardedPlan {
             guarantee: self.guarantee,
             has_other_constraints: false,
         };
-        match guarantee_status::strongest_guarantee(&mut self.dispatch, &rest, now, reason.clone()) {
+        match guarantee_status::strongest_guarantee(&mut self.dispatch, &rest, now, reason.clone())
+        {
             Ok(promise) if promise <= self.weakest_guarantee => {
                 self.guarantee = promise.max(GuaranteeLevel::PartOfEnvelope);
                 None
@@ -206,7 +209,11 @@ impl GuardedPlan {
             )
         } else {
             let about = Subject::Change(reading.fluent.clone());
-            (about, reading.observed.clone(), self.guaranteed_amounts(reading))
+            (
+                about,
+                reading.observed.clone(),
+                self.guaranteed_amounts(reading),
+            )
         };
         if allowed.contains(&observed) {
             return None;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use elbowroom_probability::optimum::PolicyTable;
 use elbowroom_probability::search::Progress;
 use elbowroom_probability::{
-    Choice, SearchState, LayerDispatch, NextHappening, OrderSearch, TooCoupled,
+    Choice, LayerDispatch, NextHappening, OrderSearch, SearchState, TooCoupled,
 };
 
 use crate::reason::Subject;

@@ -1,30 +1,32 @@
 //! `live`: the envelope is recomputed after each observation, with the observed values fixed.
 
 mod alternative;
-mod without_guarantee;
 mod box_membership;
 mod limits;
 mod repetition;
+mod without_guarantee;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
+use box_membership::BoxMembership;
 use elbowroom_model::ground::{Action, Body, Change, Effect, Expression};
 use elbowroom_num::{Interval, Rational};
 use elbowroom_plan::{Bound, InstanceId, ParameterId, ParametrizedPlan, Valuation};
-use box_membership::BoxMembership;
 
-use self::without_guarantee::{UnguaranteedPlan, ReductionClass};
 use self::repetition::Repetition;
+use self::without_guarantee::{ReductionClass, UnguaranteedPlan};
 use super::{ExecutorEntry, esterel, guarantee_status};
 use crate::dispatch::{Bounds, Dispatch, replan};
 use crate::event::Measured;
-use crate::executor::{SUPPORTS_REAL_CLOCK, PlanForm};
-use crate::executor::{Decided, Decision, Executor, PreparedPlan, DecisionContext, PlanEvent, Planned, StepId};
+use crate::executor::{
+    Decided, Decision, DecisionContext, Executor, PlanEvent, Planned, PreparedPlan, StepId,
+};
+use crate::executor::{PlanForm, SUPPORTS_REAL_CLOCK};
+use crate::measured_amounts::{MeasuredAmounts, amount_locations, amounts, duration_parameters};
 use crate::plan_comparison::{PlanComparator, RemainingPlan};
 use crate::preparation::RegionOracle;
-use crate::measured_amounts::{MeasuredAmounts, amounts, duration_parameters, amount_locations};
-use crate::reason::{Subject, Cause, GuaranteeLevel, Reason};
+use crate::reason::{Cause, GuaranteeLevel, Reason, Subject};
 
 pub(super) const REGISTERED: ExecutorEntry = ExecutorEntry {
     name: "live",
@@ -144,8 +146,12 @@ impl Executor for Live {
 
     fn carry_on(&mut self, now: &Rational) -> bool {
         let hope = self.reduction;
-        let rest = self.state.as_mut().filter(|_| hope > ReductionClass::Impossible);
-        self.unguaranteed = rest.and_then(|rest| rest.continue_by_orderings(hope, now, self.region.as_mut()));
+        let rest = self
+            .state
+            .as_mut()
+            .filter(|_| hope > ReductionClass::Impossible);
+        self.unguaranteed =
+            rest.and_then(|rest| rest.continue_by_orderings(hope, now, self.region.as_mut()));
         self.unguaranteed.is_some()
     }
 
@@ -159,7 +165,8 @@ impl Executor for Live {
 
     fn prefers_plan(&self, mission: &PreparedPlan, now: &Rational) -> bool {
         if self.unguaranteed.is_some() {
-            return guarantee_status::begin(mission).is_ok_and(|(_, promise)| promise < GuaranteeLevel::Luck);
+            return guarantee_status::begin(mission)
+                .is_ok_and(|(_, promise)| promise < GuaranteeLevel::Luck);
         }
         let rest = self.state.as_ref();
         rest.is_some_and(|rest| rest.is_worse_than(mission, now))
@@ -299,7 +306,11 @@ impl ExecutedPlan {
     }
 
     /// Processes the news, and checks whether the remaining plan is still guaranteed.
-    fn learn(&mut self, moment: &DecisionContext<'_>, region: &mut dyn RegionOracle) -> Option<Box<Reason>> {
+    fn learn(
+        &mut self,
+        moment: &DecisionContext<'_>,
+        region: &mut dyn RegionOracle,
+    ) -> Option<Box<Reason>> {
         let trouble = self.dispatch.process_news(moment);
         let moves_times = self.observe(moment);
         let has_trouble = trouble.is_some();
@@ -307,12 +318,18 @@ impl ExecutedPlan {
             if !guarantee_status::is_time_violation(&reason) {
                 return Some(reason);
             }
-            if let Err(reason) = self.continue_with_strongest_guarantee(moment.now, *reason, moves_times) {
+            if let Err(reason) =
+                self.continue_with_strongest_guarantee(moment.now, *reason, moves_times)
+            {
                 return Some(reason);
             }
         } else if moves_times {
             let reason = Reason::new(Cause::GuaranteeLost).about(Subject::InsufficientTime);
-            if let Err(reason) = self.continue_with_strongest_guarantee(moment.now, reason.since(moment.now.clone()), true) {
+            if let Err(reason) = self.continue_with_strongest_guarantee(
+                moment.now,
+                reason.since(moment.now.clone()),
+                true,
+            ) {
                 return Some(reason);
             }
         }
@@ -326,13 +343,14 @@ impl ExecutedPlan {
         // action takes longer than the box permits, starts can too, because they need the slack
         // that the delay uses up.
         let is_beyond = self.has_running_action_left_box(moment.now);
-        let mut instances = moment
-            .plan_events
-            .iter()
-            .filter_map(|news| match step_that_may_leave_envelope(news) {
-                Some(step) => Some(step.instance()),
-                None => instance_of(news).filter(|_| is_beyond),
-            });
+        let mut instances =
+            moment
+                .plan_events
+                .iter()
+                .filter_map(|news| match step_that_may_leave_envelope(news) {
+                    Some(step) => Some(step.instance()),
+                    None => instance_of(news).filter(|_| is_beyond),
+                });
         if let Some(instance) = instances.next()
             && let Some(reason) = self.query_region(instance, moment.now, region)
         {
@@ -384,7 +402,9 @@ impl ExecutedPlan {
             return None;
         }
         let plan = self.dispatch.plan();
-        let happened = plan.nodes().map(|(node, _)| self.dispatch.execution_time(node));
+        let happened = plan
+            .nodes()
+            .map(|(node, _)| self.dispatch.execution_time(node));
         let is_over = |step: &InstanceId| {
             let [_, end] = self.dispatch.start_and_end_nodes(*step);
             self.dispatch.execution_time(end).is_some()
@@ -482,9 +502,10 @@ impl ExecutedPlan {
         let now = self.dispatch.to_plan_time(now);
         for (parameter, instance) in duration_parameters(&self.prepared_plan.plan) {
             let [start, end] = self.dispatch.start_and_end_nodes(instance);
-            if let (Some(start), None) =
-                (self.dispatch.execution_time(start), self.dispatch.execution_time(end))
-            {
+            if let (Some(start), None) = (
+                self.dispatch.execution_time(start),
+                self.dispatch.execution_time(end),
+            ) {
                 let elapsed = &now - start;
                 values[parameter] = elapsed.max(values[parameter].clone());
             }

@@ -11,12 +11,14 @@ use elbowroom_model::ground::FactId;
 use elbowroom_num::Rational;
 
 use super::{ExecutorEntry, live};
-use crate::dispatch::replan;
-use crate::executor::PlanForm;
-use crate::executor::{Decided, Decision, Executor, PreparedPlan, DecisionContext, PlanEvent, Order, Planned, StepId};
 use crate::action_values::ActionValues;
 use crate::belief_state::GoalStatus as Prospect;
-use crate::reason::{Subject, Cause, Reason};
+use crate::dispatch::replan;
+use crate::executor::PlanForm;
+use crate::executor::{
+    Decided, Decision, DecisionContext, Executor, Order, PlanEvent, Planned, PreparedPlan, StepId,
+};
+use crate::reason::{Cause, Reason, Subject};
 
 use moves::{period_start, wait};
 use rollout::RolloutExecutor;
@@ -197,7 +199,9 @@ impl Policy {
                     self.changed.push((*fact, moment.belief.fact(*fact)));
                     true
                 }
-                PlanEvent::Value(_) | PlanEvent::Contradiction { .. } | PlanEvent::TimedOut { .. } => true,
+                PlanEvent::Value(_)
+                | PlanEvent::Contradiction { .. }
+                | PlanEvent::TimedOut { .. } => true,
             };
             if is_own {
                 own.push(news.clone());
@@ -207,7 +211,11 @@ impl Policy {
                     doubt = Some(Reason::new(Cause::Contradiction).for_action(action));
                 }
                 PlanEvent::TimedOut { action, since } => {
-                    doubt = Some(Reason::new(Cause::Silence).for_action(action).since(since.clone()));
+                    doubt = Some(
+                        Reason::new(Cause::Silence)
+                            .for_action(action)
+                            .since(since.clone()),
+                    );
                 }
                 _ => {}
             }
@@ -236,12 +244,14 @@ impl Policy {
             _ => return,
         };
         for order in orders {
-            self.steps.entry(order.step).or_insert_with(|| CommandedAction {
-                name: order.action.name.clone(),
-                is_of_plan: true,
-                has_started: false,
-                is_cancelled: false,
-            });
+            self.steps
+                .entry(order.step)
+                .or_insert_with(|| CommandedAction {
+                    name: order.action.name.clone(),
+                    is_of_plan: true,
+                    has_started: false,
+                    is_cancelled: false,
+                });
         }
         self.last_command = Some(match self.last_command.take() {
             Some((time, count)) if time == *now => (time, count.saturating_add(1)),
@@ -285,7 +295,8 @@ impl Policy {
         let period = match turn {
             NextEvaluation::Now(period) | NextEvaluation::At(period) => period,
         };
-        let Some(weighed) = outlook.evaluate(&self.decision_state(moment.belief, period, outlook, None))
+        let Some(weighed) =
+            outlook.evaluate(&self.decision_state(moment.belief, period, outlook, None))
         else {
             return match (kept, turn) {
                 (Some(kept), _) => kept,
@@ -315,7 +326,9 @@ impl Policy {
                 let until = period_start(period, outlook.period());
                 wait(Some(until), Subject::NextEvaluation(weighed.best()))
             }
-            NextEvaluation::Now(period) => self.best_decision(moment, period, &weighed, outlook.period()),
+            NextEvaluation::Now(period) => {
+                self.best_decision(moment, period, &weighed, outlook.period())
+            }
         }
     }
 

@@ -7,7 +7,7 @@ use elbowroom_plan::{Constraint, NodeId};
 use super::ExecutorEntry;
 use crate::dispatch::{Dispatch, constant_bounds, replan};
 use crate::executor::PlanForm;
-use crate::executor::{Decided, Executor, PreparedPlan, DecisionContext, Planned, StepId};
+use crate::executor::{Decided, DecisionContext, Executor, Planned, PreparedPlan, StepId};
 use crate::measured_amounts::amounts;
 use crate::reason::Reason;
 
@@ -89,7 +89,11 @@ enum DurationDecider {
     Executor,
 }
 
-fn reading(mission: &PreparedPlan, constraint: &Constraint, open: DurationDecider) -> ConstraintRole {
+fn reading(
+    mission: &PreparedPlan,
+    constraint: &Constraint,
+    open: DurationDecider,
+) -> ConstraintRole {
     let plan = &mission.plan.plan;
     let (lower, upper) = constant_bounds(constraint);
     let is_open = lower != upper || lower.is_none();

@@ -45,7 +45,9 @@ impl Run<'_> {
 
     /// Returns `true` if the executor could continue with the plan that it abandoned.
     pub(super) fn may_carry_on(&self) -> bool {
-        self.search_results.abandoned.is_some() && !self.is_goal_change_pending() && self.ports.executor.may_carry_on()
+        self.search_results.abandoned.is_some()
+            && !self.is_goal_change_pending()
+            && self.ports.executor.may_carry_on()
     }
 
     /// Ends the run, because there is no other plan, unless the executor continues with the plan
@@ -75,7 +77,8 @@ impl Run<'_> {
         self.action_log.resume_plan(abandoned.plan);
         self.search_results.is_plan_infeasible = false;
         self.search_results.failed_at = Some((self.now.clone(), verdict));
-        let is_of_a_step = |it: &PlanEvent| matches!(it, PlanEvent::Started { .. } | PlanEvent::Ended { .. });
+        let is_of_a_step =
+            |it: &PlanEvent| matches!(it, PlanEvent::Started { .. } | PlanEvent::Ended { .. });
         self.plan_events.retain(|it| !is_of_a_step(it));
         self.plan_events
             .splice(0..0, missed.into_iter().map(|(_, news)| news));

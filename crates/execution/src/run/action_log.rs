@@ -9,10 +9,10 @@ use elbowroom_model::ground::{
 };
 use elbowroom_num::Rational;
 
-use super::start_dependencies::{StepEvent, StartDependency, start_dependencies};
-use crate::event::{Ending, Measured, ActionHandle};
-use crate::executor::{PreparedPlan, Order, StepId};
+use super::start_dependencies::{StartDependency, StepEvent, start_dependencies};
 use crate::belief_state::BeliefState;
+use crate::event::{ActionHandle, Ending, Measured};
+use crate::executor::{Order, PreparedPlan, StepId};
 
 /// Number of steps in the report of an executive that were executed before it was last idle.
 const MAX_REPORTED_STEPS: usize = 2000;
@@ -124,7 +124,10 @@ pub struct ExecutedStep {
 impl ActionLog {
     /// Creates the account of a run that begins in the middle of an execution. It contains only the
     /// running actions.
-    pub(super) fn mid_execution(belief: &BeliefState, running: &BTreeMap<StepId, ActionHandle>) -> Self {
+    pub(super) fn mid_execution(
+        belief: &BeliefState,
+        running: &BTreeMap<StepId, ActionHandle>,
+    ) -> Self {
         let mut account = Self::default();
         for (ticket, underway) in belief.running() {
             let opened = StartEntry {
@@ -390,7 +393,12 @@ impl ActionLog {
         self.entries.get(&ticket)
     }
 
-    pub(super) fn note_start(&mut self, ticket: ActionHandle, time: &Rational, measured: &[Measured]) {
+    pub(super) fn note_start(
+        &mut self,
+        ticket: ActionHandle,
+        time: &Rational,
+        measured: &[Measured],
+    ) {
         let Some(entry) = self.entries.get_mut(&ticket) else {
             return;
         };
@@ -442,7 +450,12 @@ impl ActionLog {
     }
 
     /// Records the latest tolerable end of an action, which its window does not show.
-    pub(super) fn record_latest_tolerable_end(&mut self, ticket: ActionHandle, window: Rational, until: Rational) {
+    pub(super) fn record_latest_tolerable_end(
+        &mut self,
+        ticket: ActionHandle,
+        window: Rational,
+        until: Rational,
+    ) {
         if let Some(entry) = self.entries.get_mut(&ticket) {
             entry.latest_tolerable_end = Some((window, until));
         }
@@ -473,7 +486,11 @@ impl ActionLog {
 
     /// Returns all actions that have started and are not forgotten, as steps for the validator.
     pub(super) fn executed(&self, now: &Rational) -> Vec<ExecutedStep> {
-        self.finished_steps.iter().cloned().chain(self.executed_steps(now)).collect()
+        self.finished_steps
+            .iter()
+            .cloned()
+            .chain(self.executed_steps(now))
+            .collect()
     }
 
     fn executed_steps<'a>(&'a self, now: &'a Rational) -> impl Iterator<Item = ExecutedStep> + 'a {

@@ -10,9 +10,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use elbowroom_num::Rational;
 
 use super::Run;
+use super::background_search::BackgroundSearch;
 use super::prediction::{ExpectedStart, LateActionAssumption, PredictedState, PredictionHorizon};
 use super::situation::OverrunEstimate;
-use super::background_search::BackgroundSearch;
 use crate::event::ActionHandle;
 use crate::executor::SUPPORTS_REAL_CLOCK;
 use crate::executor::StepId;
@@ -61,7 +61,11 @@ impl Run<'_> {
     /// Notifies the planner of the expected situation at `until`, when a plan will be needed, or
     /// before that if another action is late.
     pub(super) fn announce_expected_situation(&mut self, until: &Rational) {
-        if self.search.as_ref().is_some_and(BackgroundSearch::is_optional) {
+        if self
+            .search
+            .as_ref()
+            .is_some_and(BackgroundSearch::is_optional)
+        {
             // The optional search comes first. If its plan does not take over, there is another
             // call.
             return;
@@ -79,7 +83,12 @@ impl Run<'_> {
         });
     }
 
-    fn anticipated_state(&self, until: &Rational, ends_by: &Rational, time: Rational) -> PredictedState {
+    fn anticipated_state(
+        &self,
+        until: &Rational,
+        ends_by: &Rational,
+        time: Rational,
+    ) -> PredictedState {
         self.expected_situation(&PredictionHorizon {
             time,
             starts_before: until.clone(),
@@ -137,7 +146,11 @@ impl Run<'_> {
 
     /// Keeps the forecast when the present plan is abandoned, with the steps that were started.
     pub(super) fn keep_forecast(&mut self) {
-        if let Some(mut foreseen) = self.anticipated_replan.take().filter(|_| SUPPORTS_REAL_CLOCK) {
+        if let Some(mut foreseen) = self
+            .anticipated_replan
+            .take()
+            .filter(|_| SUPPORTS_REAL_CLOCK)
+        {
             if foreseen.abandoned.is_none() {
                 foreseen.abandoned = Some(AbandonedPlanState {
                     steps: self.action_log.steps().clone(),
@@ -150,8 +163,14 @@ impl Run<'_> {
 
     /// Returns the foreseen situation if it is near and the execution was as foreseen. Small
     /// differences in time are permitted, unless plans are awaited.
-    pub(super) fn anticipated_situation(&mut self, guess: OverrunEstimate) -> Option<AnticipatedSituation> {
-        let foreseen = self.anticipated_replan.take().filter(|_| SUPPORTS_REAL_CLOCK)?;
+    pub(super) fn anticipated_situation(
+        &mut self,
+        guess: OverrunEstimate,
+    ) -> Option<AnticipatedSituation> {
+        let foreseen = self
+            .anticipated_replan
+            .take()
+            .filter(|_| SUPPORTS_REAL_CLOCK)?;
         let PredictedState {
             situation, running, ..
         } = &foreseen.prospect;
@@ -170,7 +189,10 @@ impl Run<'_> {
                     None => self.matches_forecast(&foreseen),
                 };
         is_as_foreseen.then(|| AnticipatedSituation {
-            abandoned_steps: foreseen.abandoned.map(|left| left.steps).unwrap_or_default(),
+            abandoned_steps: foreseen
+                .abandoned
+                .map(|left| left.steps)
+                .unwrap_or_default(),
             prospect: foreseen.prospect,
             since: foreseen.since,
             is_approximate: is_guess,
@@ -185,12 +207,17 @@ impl Run<'_> {
         let time = foreseen.prospect.situation.time.clone();
         let anew = || self.anticipated_state(until, &ends_by, time);
         !foreseen.is_outdated
-            && self.anticipated_actions(&foreseen.prospect, until) == self.anticipated_actions(&anew(), until)
+            && self.anticipated_actions(&foreseen.prospect, until)
+                == self.anticipated_actions(&anew(), until)
     }
 
     /// Returns the actions that are foreseen to be running, except those that start or end at about
     /// that time.
-    fn anticipated_actions(&self, prospect: &PredictedState, until: &Rational) -> BTreeSet<AnticipatedAction> {
+    fn anticipated_actions(
+        &self,
+        prospect: &PredictedState,
+        until: &Rational,
+    ) -> BTreeSet<AnticipatedAction> {
         let slack = Self::punctuality_tolerance();
         let is_about_then = |time: &Rational| *time >= until - &slack && *time <= until + &slack;
         let first = prospect.expected.first().map(|it| it.ticket);

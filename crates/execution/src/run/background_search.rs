@@ -1,7 +1,7 @@
 //! Background planning: execution during a search, and the switch to the new plan.
 
-mod fitting;
 mod background_preparation;
+mod fitting;
 mod switch_over;
 
 use std::collections::BTreeMap;
@@ -10,25 +10,25 @@ use std::sync::Arc;
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
-use super::work_queue::PendingStep;
 use super::abandoned_plan::AbandonedPlan;
+use super::anticipated_replan::AnticipatedSituation;
 use super::dead_end::is_goal_unreachable;
 use super::doubts::DoubtInquiry;
-use super::prediction::{ExpectedStart, PredictedState};
-use super::anticipated_replan::AnticipatedSituation;
-use super::replanning::NextAttempt;
-use super::situation::OverrunEstimate;
 use super::observations::Remark;
 use super::persistent::PendingGoalChange;
+use super::prediction::{ExpectedStart, PredictedState};
+use super::replanning::NextAttempt;
+use super::situation::OverrunEstimate;
 use super::snapshot::Goals;
+use super::work_queue::PendingStep;
 use super::{GoalStatus, Run, Stop, Verdict};
+use crate::belief_state::BeliefState;
 use crate::event::ActionHandle;
-use crate::executor::SUPPORTS_REAL_CLOCK;
 use crate::executor::PlanForm;
+use crate::executor::SUPPORTS_REAL_CLOCK;
 use crate::executor::StepId;
 use crate::planning::{PlanAnswer, Planned};
-use crate::belief_state::BeliefState;
-use crate::reason::{Subject, Cause, Reason};
+use crate::reason::{Cause, Reason, Subject};
 use crate::record::Entry;
 use crate::request::{RequestId, Urgency};
 use background_preparation::BackgroundPreparation;
@@ -115,7 +115,9 @@ impl BackgroundSearch {
         let is_made = self.answer.is_some() && !self.has_finished;
         (
             is_made,
-            self.preparation.as_ref().is_some_and(BackgroundPreparation::has_arrived),
+            self.preparation
+                .as_ref()
+                .is_some_and(BackgroundPreparation::has_arrived),
         )
     }
 
@@ -205,7 +207,11 @@ impl Run<'_> {
         self.abandon_plan();
         self.plan_events.clear();
         if !self.finish_if_goal_holds(reason) {
-            self.search(reason.clone(), OverrunEstimate::QuarterLonger, ExecutionDuringSearch::RunningActionsOnly);
+            self.search(
+                reason.clone(),
+                OverrunEstimate::QuarterLonger,
+                ExecutionDuringSearch::RunningActionsOnly,
+            );
         }
     }
 
@@ -250,7 +256,9 @@ impl Run<'_> {
         };
         let ahead = foreseen.unwrap_or_else(|| AnticipatedSituation {
             prospect: match &course {
-                ExecutionDuringSearch::PlanContinues { until } => self.expected_situation_after_planning(until.as_ref()),
+                ExecutionDuringSearch::PlanContinues { until } => {
+                    self.expected_situation_after_planning(until.as_ref())
+                }
                 ExecutionDuringSearch::RunningActionsOnly => {
                     let (situation, running) = self.situation(&self.expected_planning_time, guess);
                     PredictedState {
@@ -304,7 +312,11 @@ impl Run<'_> {
 
     /// Ends the search if it is optional, that is, if the present plan continues without it.
     pub(super) fn cancel_optional_search(&mut self) {
-        if self.search.as_ref().is_some_and(BackgroundSearch::is_optional) {
+        if self
+            .search
+            .as_ref()
+            .is_some_and(BackgroundSearch::is_optional)
+        {
             self.cancel_search();
         }
     }
@@ -359,7 +371,9 @@ impl Run<'_> {
         }
         match &search.execution {
             ExecutionDuringSearch::PlanContinues { until: Some(until) } => until.clone(),
-            ExecutionDuringSearch::PlanContinues { until: None } => self.settings.time_limit.clone(),
+            ExecutionDuringSearch::PlanContinues { until: None } => {
+                self.settings.time_limit.clone()
+            }
             // A deadline may pass before the planner answers.
             ExecutionDuringSearch::RunningActionsOnly => {
                 let timed = self.belief.next_timed();
@@ -381,7 +395,10 @@ impl Run<'_> {
     fn search_time_limit(&self, search: &BackgroundSearch) -> Rational {
         let expected = &self.expected_planning_time * &Rational::from(2);
         let patience = expected.max(Rational::from(MIN_SEARCH_TIME));
-        let doublings = self.search_results.ended_after_time_limit.min(MAX_DOUBLINGS);
+        let doublings = self
+            .search_results
+            .ended_after_time_limit
+            .min(MAX_DOUBLINGS);
         &search.started_at + patience * Rational::from(1_i64 << doublings)
     }
 
@@ -444,7 +461,9 @@ impl Run<'_> {
             return;
         };
         search.timed = timed;
-        if search.execution == ExecutionDuringSearch::RunningActionsOnly && is_goal_unreachable(&self.belief) {
+        if search.execution == ExecutionDuringSearch::RunningActionsOnly
+            && is_goal_unreachable(&self.belief)
+        {
             let (reason, guess) = (search.reason.clone(), search.guess);
             self.cancel_search();
             self.search(reason, guess, ExecutionDuringSearch::RunningActionsOnly);
@@ -454,7 +473,8 @@ impl Run<'_> {
     /// Waits for the plan if only running actions continue. Returns `true` if it does.
     fn is_waiting_for_plan(&mut self) -> bool {
         let search = self.search.as_ref();
-        let waits = search.is_some_and(|search| search.execution == ExecutionDuringSearch::RunningActionsOnly);
+        let waits = search
+            .is_some_and(|search| search.execution == ExecutionDuringSearch::RunningActionsOnly);
         if waits {
             self.wait_for_search();
         }
@@ -467,7 +487,8 @@ impl Run<'_> {
         let until = timeout.chain(self.next_search_decision()).min();
         let until = until.unwrap_or_else(|| self.settings.time_limit.clone());
         self.work_queue.push(PendingStep::CheckTimeouts);
-        self.work_queue.push(PendingStep::Wait(until.max(self.now.clone())));
+        self.work_queue
+            .push(PendingStep::Wait(until.max(self.now.clone())));
     }
 
     /// Processes the planner's answer.
@@ -504,7 +525,9 @@ impl Run<'_> {
                 self.cancel_overdue(search.reason);
                 Ok(())
             }
-            PlanAnswer::Plan(plan) if search.execution == ExecutionDuringSearch::RunningActionsOnly => {
+            PlanAnswer::Plan(plan)
+                if search.execution == ExecutionDuringSearch::RunningActionsOnly =>
+            {
                 search.plan = Some((plan.clone(), self.now.clone()));
                 self.switch_from_empty_plan(search, &plan, true)
             }
@@ -526,7 +549,11 @@ impl Run<'_> {
             }
             // There was no plan from that situation, but there may be one from the present one.
             _ if search.is_outdated => self.search_again(&search.reason),
-            _ if search.execution != ExecutionDuringSearch::RunningActionsOnly && self.exclude_new_goals() => Ok(()),
+            _ if search.execution != ExecutionDuringSearch::RunningActionsOnly
+                && self.exclude_new_goals() =>
+            {
+                Ok(())
+            }
             // The situation was only a forecast.
             _ if search.is_approximate
                 || !search.expected.is_empty()
@@ -540,10 +567,16 @@ impl Run<'_> {
     }
 
     /// Continues if there is no plan from a situation in which nothing more is started.
-    fn handle_missing_plan(&mut self, search: &BackgroundSearch, answer: &PlanAnswer) -> Result<(), Stop> {
+    fn handle_missing_plan(
+        &mut self,
+        search: &BackgroundSearch,
+        answer: &PlanAnswer,
+    ) -> Result<(), Stop> {
         let reason = search.reason.clone();
         match self.next_attempt(search.guess) {
-            NextAttempt::Guess(guess) => self.search(reason, guess, ExecutionDuringSearch::RunningActionsOnly),
+            NextAttempt::Guess(guess) => {
+                self.search(reason, guess, ExecutionDuringSearch::RunningActionsOnly)
+            }
             NextAttempt::CancelOverdue => self.cancel_overdue(reason),
             NextAttempt::ContinuePlan => {
                 return self.continue_or_stop_without_plan(answer, reason);
@@ -560,7 +593,11 @@ impl Run<'_> {
         }
         let about = "events during planning".to_owned();
         let reason = Reason::new(Cause::Surprise).about(Subject::ExternalMessage(about));
-        let reason = if self.is_goal_change_pending() { first } else { &reason };
+        let reason = if self.is_goal_change_pending() {
+            first
+        } else {
+            &reason
+        };
         self.search_results.outdated_plans += 1;
         self.count_replan(reason)?;
         if self.search_results.outdated_plans > 1 || self.search_results.is_plan_infeasible {
@@ -572,7 +609,11 @@ impl Run<'_> {
         // The search is expected to take about as long again.
         let ahead = &self.expected_planning_time * &Rational::new(3, 2);
         let until = Some(&self.now + ahead + self.task.epsilon());
-        self.search(reason.clone(), OverrunEstimate::QuarterLonger, ExecutionDuringSearch::PlanContinues { until });
+        self.search(
+            reason.clone(),
+            OverrunEstimate::QuarterLonger,
+            ExecutionDuringSearch::PlanContinues { until },
+        );
         Ok(())
     }
 }

@@ -5,12 +5,12 @@ use std::sync::Arc;
 use elbowroom_model::TimeTriggeredPlan;
 use elbowroom_num::Rational;
 
+use super::pending::PreparationFallback;
 use super::plan_start::PlanStart;
 use super::replanning::Attempt;
 use super::situation::OverrunEstimate;
-use super::pending::PreparationFallback;
 use super::{PlanningTime, Run, RunningRule, Stop};
-use crate::executor::{PreparedPlan, PlanForm};
+use crate::executor::{PlanForm, PreparedPlan};
 use crate::planning::PlanAnswer;
 use crate::reason::{Cause, Reason};
 use crate::record::Entry;
@@ -75,7 +75,11 @@ impl Run<'_> {
 
     /// Returns `true` if a prepared plan takes over from the present one, and counts the new plan
     /// then.
-    pub(super) fn replaces_present_plan(&mut self, mission: &PreparedPlan, reason: &Reason) -> Result<bool, Stop> {
+    pub(super) fn replaces_present_plan(
+        &mut self,
+        mission: &PreparedPlan,
+        reason: &Reason,
+    ) -> Result<bool, Stop> {
         if self.ports.executor.prefers_plan(mission, &self.now) {
             self.count_replan(reason)?;
             return Ok(true);
@@ -91,6 +95,11 @@ impl Run<'_> {
     pub(super) fn prepare_better_plan(&mut self, attempt: Attempt, plan: &TimeTriggeredPlan) {
         let (task, goals) = (Arc::clone(&self.task), self.goals());
         let course = PlanStart::of(plan, &attempt.situation, &attempt.running);
-        self.await_preparation(&task, &goals, course, PreparationFallback::ContinuePlan(attempt.reason));
+        self.await_preparation(
+            &task,
+            &goals,
+            course,
+            PreparationFallback::ContinuePlan(attempt.reason),
+        );
     }
 }

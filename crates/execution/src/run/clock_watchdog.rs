@@ -83,7 +83,7 @@ impl ClockWatchdog {
 
 #[cfg(test)]
 mod tests {
-    use super::{MAX_ANSWERS, ClockWatchdog};
+    use super::{ClockWatchdog, MAX_ANSWERS};
     use elbowroom_num::Rational;
 
     /// Returns the number of accepted answers if the nth has the time `clock(n)`.
@@ -116,7 +116,10 @@ mod tests {
     #[test]
     fn heartbeat_and_large_plan_are_accepted() {
         let most = i64::try_from(MAX_ANSWERS).expect("a small number");
-        assert_eq!(accepted_answers(3 * most, 0, |n| Rational::new(n, 5000)), 3 * most);
+        assert_eq!(
+            accepted_answers(3 * most, 0, |n| Rational::new(n, 5000)),
+            3 * most
+        );
         assert_eq!(
             accepted_answers(3 * most, 3 * MAX_ANSWERS, |_| Rational::ZERO),
             3 * most

@@ -13,9 +13,9 @@ use elbowroom_model::{Situation, Task, reachability};
 use elbowroom_num::{Interval, Rational};
 
 use super::{ActionLog, Run};
-use crate::event::{Ending, ActionHandle};
 use crate::belief_state::BeliefState;
-use crate::reason::{Subject, Evidence, Cause, TimedChange, Reason};
+use crate::event::{ActionHandle, Ending};
+use crate::reason::{Cause, Evidence, Reason, Subject, TimedChange};
 
 /// An observation that was believed.
 #[derive(Clone, Debug)]
@@ -76,7 +76,10 @@ impl Run<'_> {
                 None => reason,
             }];
         }
-        let explained = lost.iter().take(MAX_EXPLAINED_PARTS).map(|goal| past.explain(goal));
+        let explained = lost
+            .iter()
+            .take(MAX_EXPLAINED_PARTS)
+            .map(|goal| past.explain(goal));
         explained.collect()
     }
 
@@ -162,7 +165,9 @@ impl RunHistory<'_> {
     fn explain_between(&self, count: usize, reason: Reason, goal: &Condition) -> Reason {
         let next = self.history.get(count);
         let until = next.map_or(self.now, |next| &next.time).clone();
-        if let Some((time, event)) = self.explain_by_timed_initials(&self.belief_after(count), &until, goal) {
+        if let Some((time, event)) =
+            self.explain_by_timed_initials(&self.belief_after(count), &until, goal)
+        {
             return with_event(reason, event, time);
         }
         match next {

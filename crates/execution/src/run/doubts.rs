@@ -9,14 +9,14 @@ use std::sync::Arc;
 use elbowroom_model::ground::{Action, Body, SnapAction};
 use elbowroom_num::Rational;
 
-use super::work_queue::PendingStep;
 use super::dead_end::BelievedEventKind;
 use super::observations::Remark;
+use super::work_queue::PendingStep;
 use super::{MissingPlan, Next, Run, Stop, Verdict};
-use crate::event::{Ending, Measured, ActionHandle};
+use crate::belief_state::Doubt;
+use crate::event::{ActionHandle, Ending, Measured};
 use crate::executor::PlanEvent;
 use crate::planning::PlanAnswer;
-use crate::belief_state::Doubt;
 use crate::reason::Reason;
 
 /// The last question to the world about doubts.
@@ -133,7 +133,8 @@ impl Run<'_> {
         let doubts = self.belief.doubt_count();
         if outcome.is_err() && !running.is_empty() && doubts > 0 {
             self.work_queue.push(PendingStep::Plan(reason));
-            self.work_queue.push(PendingStep::WaitForActions(running, doubts));
+            self.work_queue
+                .push(PendingStep::WaitForActions(running, doubts));
             return Ok(());
         }
         outcome

@@ -11,10 +11,10 @@ use std::collections::BTreeSet;
 
 use elbowroom_num::Rational;
 
+use super::background_search::SearchResults;
 use super::dead_end::unreachable_conditions;
 use super::goals::OpenGoal;
-use super::background_search::SearchResults;
-use super::selection::{Selection, GoalSet, SelectionStep};
+use super::selection::{GoalSet, Selection, SelectionStep};
 use super::shortfall::Conflict;
 use super::{Run, Verdict};
 use crate::record::{Entry, GoalChange};
@@ -431,7 +431,12 @@ impl Run<'_> {
 
     /// Pursues the goals of the next step. Returns `false` if there is no plan for any goal. A plan
     /// is requested or kept if the step tries goals, or if `is_to_plan` for the selected ones.
-    fn pursue_selection_step(&mut self, mut choosing: GoalSelection, mut step: SelectionStep, is_to_plan: bool) -> bool {
+    fn pursue_selection_step(
+        &mut self,
+        mut choosing: GoalSelection,
+        mut step: SelectionStep,
+        is_to_plan: bool,
+    ) -> bool {
         let conflicts = self.conflicts();
         let Some(lasting) = &mut self.goal_manager else {
             return false;

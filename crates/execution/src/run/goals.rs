@@ -11,7 +11,7 @@ use super::persistent::{PROBLEM_GOAL_NAME, PendingGoalChange};
 use super::snapshot::{GivenGoal, Goals};
 use crate::event::GoalTerms;
 use crate::executor::PlanForm;
-use crate::reason::{Subject, Cause, Reason};
+use crate::reason::{Cause, Reason, Subject};
 
 /// An open goal.
 pub(super) struct OpenGoal {
@@ -128,7 +128,9 @@ impl Run<'_> {
         let pursued = goals.iter().filter(|it| it.is_pursued());
         let deadlines = pursued.filter_map(|it| Some((it.terms.deadline.clone()?, &it.condition)));
         let others = goals.iter().filter(|it| it.terms.deadline.is_none());
-        let in_time = task.with_goal(conjunction(others)).with_deadlines(deadlines);
+        let in_time = task
+            .with_goal(conjunction(others))
+            .with_deadlines(deadlines);
         let chooses_order = self.ports.executor.need() == PlanForm::PartialOrder;
         match in_time.filter(|_| !chooses_order) {
             Some(task) => task,
@@ -219,7 +221,8 @@ impl Run<'_> {
     /// Restores a change of the goals.
     pub(super) fn restore_goal_change(&mut self, turn: Option<(String, bool)>) {
         if let Some(lasting) = &mut self.goal_manager {
-            lasting.pending_change = turn.map(|(words, may_keep)| PendingGoalChange::of(words, may_keep));
+            lasting.pending_change =
+                turn.map(|(words, may_keep)| PendingGoalChange::of(words, may_keep));
         }
     }
 

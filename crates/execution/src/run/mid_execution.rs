@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::work_queue::PendingStep;
-use super::{ActionLog, PlanEvent, Ports, BeliefState, Run, RunSettings, ActionHandle};
+use super::{ActionHandle, ActionLog, BeliefState, PlanEvent, Ports, Run, RunSettings};
 use crate::executor::PreparedPlan;
 use crate::executor::StepId;
 use crate::reason::Reason;
@@ -35,7 +35,12 @@ pub enum EntryPoint {
 
 impl<'a> Run<'a> {
     /// Creates a run that begins in the middle of an execution. Its task is that of the belief.
-    pub fn amid(amid: MidExecutionStart, beginning: EntryPoint, settings: RunSettings, ports: Ports<'a>) -> Self {
+    pub fn amid(
+        amid: MidExecutionStart,
+        beginning: EntryPoint,
+        settings: RunSettings,
+        ports: Ports<'a>,
+    ) -> Self {
         let MidExecutionStart {
             belief,
             plan_events: news,

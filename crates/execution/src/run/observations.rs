@@ -7,7 +7,7 @@ use elbowroom_num::Rational;
 
 use super::Run;
 use super::dead_end::BelievedEventKind;
-use crate::event::{Ending, Event, Measured, Observation, ActionHandle};
+use crate::event::{ActionHandle, Ending, Event, Measured, Observation};
 use crate::executor::{Amount, PlanEvent, Planned};
 use crate::measured_amounts;
 use crate::record::Entry;
@@ -19,7 +19,8 @@ const TIME_IN_FUTURE: &str = "its time is in the future; taken as now";
 const TIME_BEFORE_COMMAND: &str = "its time is before the command; taken as then";
 const TIME_BEFORE_START: &str = "its time is before its start; taken as then";
 const START_NOT_REPORTED: &str = "its start was not reported";
-const START_ASSUMED_AT_COMMAND: &str = "its start was not reported; taken as the time of the request";
+const START_ASSUMED_AT_COMMAND: &str =
+    "its start was not reported; taken as the time of the request";
 
 /// Returns `true` if a remark on a report means that the report was counted with another time, or
 /// with an assumed start. Other remarks are on reports that were ignored, contradict an earlier
@@ -122,7 +123,10 @@ impl Run<'_> {
             Event::Value { fluent, value } => {
                 self.advance_belief(&time);
                 if self.belief.observe_value(*fluent, value) {
-                    self.record_believed_event(&time, BelievedEventKind::Value(*fluent, value.clone()));
+                    self.record_believed_event(
+                        &time,
+                        BelievedEventKind::Value(*fluent, value.clone()),
+                    );
                     self.record_unexpected_event();
                     self.plan_events.push(PlanEvent::Value(*fluent));
                 }
@@ -140,7 +144,12 @@ impl Run<'_> {
     }
 
     /// Processes a report on the completion of a running action.
-    fn process_progress(&mut self, ticket: ActionHandle, time: &Rational, done: Option<&Rational>) -> Remark {
+    fn process_progress(
+        &mut self,
+        ticket: ActionHandle,
+        time: &Rational,
+        done: Option<&Rational>,
+    ) -> Remark {
         match self.action_log.recent(ticket) {
             None => Some(self.unknown_ticket_remark(ticket)),
             Some(entry) if entry.ended.is_some() => Some("it had ended already"),
@@ -168,7 +177,12 @@ impl Run<'_> {
         let _ = self.belief.advance_for_happening(time);
     }
 
-    fn process_start(&mut self, ticket: ActionHandle, time: &Rational, measured: &[Measured]) -> Remark {
+    fn process_start(
+        &mut self,
+        ticket: ActionHandle,
+        time: &Rational,
+        measured: &[Measured],
+    ) -> Remark {
         let Some(entry) = self.action_log.recent(ticket) else {
             return Some(self.unknown_ticket_remark(ticket));
         };
@@ -257,7 +271,8 @@ impl Run<'_> {
             self.record_believed_event(&time, BelievedEventKind::Stopped(ticket));
             self.record_unexpected_event();
             if is_refused && let Some(entry) = self.action_log.get(ticket) {
-                self.refusal_backoff.record_refusal(&entry.action.name, &self.now);
+                self.refusal_backoff
+                    .record_refusal(&entry.action.name, &self.now);
             }
         }
         // An instantaneous action ends when it starts; later reports contain nothing new.
@@ -268,7 +283,10 @@ impl Run<'_> {
         if is_over {
             return was_silent.then_some(START_NOT_REPORTED);
         }
-        let timed_out = self.action_log.get(ticket).and_then(|it| it.timed_out.clone());
+        let timed_out = self
+            .action_log
+            .get(ticket)
+            .and_then(|it| it.timed_out.clone());
         if let Some(since) = timed_out.filter(|_| *ending != Ending::Succeeded) {
             self.end_timed_out(ticket, &time, since);
             return None;
@@ -302,7 +320,9 @@ impl Run<'_> {
     ) -> Vec<Amount> {
         let amount = |measured: &Measured| {
             let mut values = Vec::new();
-            if let Some(expression) = measured_amounts::amount_expression(action, is_end, measured.fluent) {
+            if let Some(expression) =
+                measured_amounts::amount_expression(action, is_end, measured.fluent)
+            {
                 expression.visit_leaves(&mut |leaf| {
                     if let Expression::Fluent(fluent) = leaf {
                         let value = self.belief.value_on_arrival(*fluent);
@@ -344,7 +364,8 @@ impl Run<'_> {
             Body::Durative(body) => &body.start.effects,
         };
         for effect in effects {
-            self.plan_events.push(PlanEvent::from_change(&effect.change));
+            self.plan_events
+                .push(PlanEvent::from_change(&effect.change));
         }
     }
 

@@ -6,13 +6,13 @@ use std::sync::Arc;
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
+use super::background_search::BackgroundSearch;
+use super::persistent::PendingGoalChange;
 use super::plan_start::{PlanStart, preparation_failure};
 use super::replanning::Attempt;
-use super::persistent::PendingGoalChange;
-use super::background_search::BackgroundSearch;
 use super::snapshot::Goals;
 use super::{Next, Run, Stop};
-use crate::event::{Event, Observation, ActionHandle};
+use crate::event::{ActionHandle, Event, Observation};
 use crate::executor::PreparedPlan;
 use crate::planning::Planned;
 use crate::preparation::PrepareError;
@@ -119,7 +119,10 @@ impl Run<'_> {
 
     /// Returns the answers that arrived during the wait that ends at `now`, as observations.
     pub(super) fn take_arrived_answers(&self, now: &Rational) -> Vec<Observation> {
-        let (is_made, is_ready) = self.search.as_ref().map_or((false, false), BackgroundSearch::arrived_answers);
+        let (is_made, is_ready) = self
+            .search
+            .as_ref()
+            .map_or((false, false), BackgroundSearch::arrived_answers);
         let made = is_made.then_some(Event::PlanMade);
         let ready = is_ready.then_some(Event::PlanReady);
         let events = made.into_iter().chain(ready);
@@ -240,9 +243,13 @@ impl Run<'_> {
             Err(error) => {
                 return match preparation.fallback {
                     PreparationFallback::EndRun => Err(preparation_failure(&error)),
-                    PreparationFallback::AdoptUnfitted(search, plan) => self.switch_unfitted(*search, &plan),
+                    PreparationFallback::AdoptUnfitted(search, plan) => {
+                        self.switch_unfitted(*search, &plan)
+                    }
                     PreparationFallback::SearchAgain(search) => self.search_again(&search.reason),
-                    PreparationFallback::ReplanForGoals(turn) => self.replan_for_changed_goals(&turn),
+                    PreparationFallback::ReplanForGoals(turn) => {
+                        self.replan_for_changed_goals(&turn)
+                    }
                     PreparationFallback::ContinuePlan(_) => Ok(()),
                 };
             }

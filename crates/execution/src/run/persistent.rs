@@ -31,20 +31,20 @@ use std::sync::Arc;
 use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan, problem};
 use elbowroom_num::Rational;
 
-use super::work_queue::PendingStep;
-use super::plan_start::PlanStart;
+use super::background_search::SearchResults;
 use super::goal_selection::GoalSelection;
 use super::goals::OpenGoal;
-use super::situation::{OverrunEstimate, remaining_plan_of};
-use super::observations::Remark;
 use super::kept_goals::Wait;
+use super::observations::Remark;
 use super::pending::PreparationFallback;
-use super::background_search::SearchResults;
+use super::plan_start::PlanStart;
+use super::situation::{OverrunEstimate, remaining_plan_of};
 use super::snapshot::Goals;
+use super::work_queue::PendingStep;
 use super::{Run, Stop, Verdict};
-use crate::event::{Request, ActionHandle};
+use crate::event::{ActionHandle, Request};
 use crate::executor::PlanEvent;
-use crate::reason::{Subject, Cause, Reason};
+use crate::reason::{Cause, Reason, Subject};
 use crate::record::Entry;
 
 /// Name of the problem's own goal.
@@ -286,7 +286,10 @@ impl<'a> Run<'a> {
         if !self.awaits_timed_initials() {
             return;
         }
-        let past = self.task.timed().get(before..self.belief.past_timed_initials());
+        let past = self
+            .task
+            .timed()
+            .get(before..self.belief.past_timed_initials());
         let changes = past.unwrap_or_default().iter().flat_map(|it| &it.changes);
         self.plan_events.extend(changes.map(PlanEvent::from_change));
     }
@@ -321,7 +324,10 @@ impl<'a> Run<'a> {
 
     /// Keeps the remaining plan, or makes another one.
     fn handle_goal_change(&mut self, turn: PendingGoalChange) -> Result<(), Stop> {
-        let has_goals = self.goal_manager.as_ref().is_some_and(|it| !it.goals.is_empty());
+        let has_goals = self
+            .goal_manager
+            .as_ref()
+            .is_some_and(|it| !it.goals.is_empty());
         if !has_goals {
             self.drop_plan();
             match &mut self.goal_manager {
@@ -332,7 +338,11 @@ impl<'a> Run<'a> {
             }
             return Ok(());
         }
-        let rest = if turn.are_goals_only_added { self.remaining_plan() } else { None };
+        let rest = if turn.are_goals_only_added {
+            self.remaining_plan()
+        } else {
+            None
+        };
         if let Some(rest) = rest {
             if self.plans_aside() && self.settings.readies_aside {
                 self.prepare_remaining_plan(turn, rest);
@@ -341,14 +351,22 @@ impl<'a> Run<'a> {
             let (plan, situation, running) = rest;
             let course = PlanStart::of(&plan, &situation, &running);
             let (task, goals) = (Arc::clone(&self.task), self.goals());
-            self.await_preparation(&task, &goals, course, PreparationFallback::ReplanForGoals(turn));
+            self.await_preparation(
+                &task,
+                &goals,
+                course,
+                PreparationFallback::ReplanForGoals(turn),
+            );
             return Ok(());
         }
         self.replan_for_changed_goals(&turn)
     }
 
     /// Makes another plan, because the goals have changed.
-    pub(super) fn replan_for_changed_goals(&mut self, turn: &PendingGoalChange) -> Result<(), Stop> {
+    pub(super) fn replan_for_changed_goals(
+        &mut self,
+        turn: &PendingGoalChange,
+    ) -> Result<(), Stop> {
         if self.search_while_plan_continues(&turn.reason)? {
             return Ok(());
         }
@@ -387,7 +405,8 @@ impl<'a> Run<'a> {
 
     /// Drops the plan. Running actions are no longer part of a plan.
     pub(super) fn drop_plan(&mut self) {
-        self.action_log.begin_plan(&std::collections::BTreeMap::new());
+        self.action_log
+            .begin_plan(&std::collections::BTreeMap::new());
         if let Some(lasting) = &mut self.goal_manager {
             lasting.plan = None;
             lasting.planned_goals.clear();
@@ -420,7 +439,11 @@ impl<'a> Run<'a> {
             return None;
         }
         let is_told = |ticket: &ActionHandle| self.belief.running().contains_key(ticket);
-        if !self.action_log.open_tickets().all(|ticket| is_told(&ticket)) {
+        if !self
+            .action_log
+            .open_tickets()
+            .all(|ticket| is_told(&ticket))
+        {
             return None;
         }
         let mut left: Vec<Step> = plan.steps.clone();
@@ -452,12 +475,16 @@ impl<'a> Run<'a> {
         let until = timeout.into_iter().chain(soon).chain(timed).min();
         let until = until.unwrap_or_else(|| self.settings.time_limit.clone());
         self.work_queue.push(PendingStep::CheckTimeouts);
-        self.work_queue.push(PendingStep::Wait(until.max(self.now.clone())));
+        self.work_queue
+            .push(PendingStep::Wait(until.max(self.now.clone())));
     }
 
     /// Returns `true` if it is time to search for a plan again.
     fn is_search_due(&self) -> bool {
-        let since = self.goal_manager.as_ref().and_then(|it| it.idle_since.as_ref());
+        let since = self
+            .goal_manager
+            .as_ref()
+            .and_then(|it| it.idle_since.as_ref());
         since.is_some_and(|since| {
             !self.plan_events.is_empty() && self.now >= since + Rational::from(SEARCH_PAUSE)
         })

@@ -11,7 +11,7 @@ use super::snapshot::Goals;
 use super::{MissingPlan, Run, Stop, Verdict};
 use crate::event::ActionHandle;
 use crate::executor::SUPPORTS_REAL_CLOCK;
-use crate::executor::{PreparedPlan, PlanEvent, StepId};
+use crate::executor::{PlanEvent, PreparedPlan, StepId};
 use crate::preparation::PrepareError;
 use crate::record::Entry;
 
@@ -50,7 +50,12 @@ impl Run<'_> {
     }
 
     /// Has a plan prepared for these goals, which belong to this task, and begins with it.
-    pub(super) fn adopt_plan_for_goals(&mut self, task: &Arc<Task>, goals: &Goals, course: PlanStart<'_>) {
+    pub(super) fn adopt_plan_for_goals(
+        &mut self,
+        task: &Arc<Task>,
+        goals: &Goals,
+        course: PlanStart<'_>,
+    ) {
         self.await_preparation(task, goals, course, PreparationFallback::EndRun);
     }
 
@@ -103,7 +108,8 @@ impl Run<'_> {
             }
             missed.sort_by(|(one, _), (other, _)| one.cmp(other));
         }
-        self.plan_events.extend(missed.into_iter().map(|(_, news)| news));
+        self.plan_events
+            .extend(missed.into_iter().map(|(_, news)| news));
         Ok(())
     }
 
@@ -132,7 +138,11 @@ impl Run<'_> {
     }
 
     /// Returns the start of a step as news.
-    pub(super) fn start_event(&self, step: StepId, ticket: ActionHandle) -> Option<(Rational, PlanEvent)> {
+    pub(super) fn start_event(
+        &self,
+        step: StepId,
+        ticket: ActionHandle,
+    ) -> Option<(Rational, PlanEvent)> {
         let time = self.action_log.get(ticket)?.started.clone()?;
         let measured = Vec::new();
         let news = PlanEvent::Started {
@@ -144,7 +154,11 @@ impl Run<'_> {
     }
 
     /// Returns the end of a step as news. An instantaneous action ends when it starts.
-    pub(super) fn end_event(&self, step: StepId, ticket: ActionHandle) -> Option<(Rational, PlanEvent)> {
+    pub(super) fn end_event(
+        &self,
+        step: StepId,
+        ticket: ActionHandle,
+    ) -> Option<(Rational, PlanEvent)> {
         let entry = self.action_log.get(ticket)?;
         let (time, ending) = entry.ended.clone()?;
         if entry.planned.is_none() && entry.started.is_some() {

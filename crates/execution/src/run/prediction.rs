@@ -15,9 +15,9 @@ use elbowroom_num::{Interval, Rational};
 use super::Run;
 use super::situation::{OverrunEstimate, quarter_longer_end, situation_at};
 use super::start_dependencies::StepEvent;
+use crate::belief_state::{BeliefState, RunningActionState};
 use crate::event::ActionHandle;
 use crate::executor::{PlanForm, StepId};
-use crate::belief_state::{BeliefState, RunningActionState};
 
 /// An expected start of the present plan.
 #[derive(Clone, Debug)]
@@ -93,7 +93,10 @@ impl Run<'_> {
 
     /// Returns the expected situation when planning ends, or at `until`, if the present plan
     /// continues.
-    pub(super) fn expected_situation_after_planning(&self, until: Option<&Rational>) -> PredictedState {
+    pub(super) fn expected_situation_after_planning(
+        &self,
+        until: Option<&Rational>,
+    ) -> PredictedState {
         let epsilon = self.task.epsilon();
         let expected_to_be_over = &self.now + &self.expected_planning_time + epsilon;
         let time = until.cloned().unwrap_or(expected_to_be_over);
@@ -111,7 +114,8 @@ impl Run<'_> {
         let mut future = self.initial_forecast(reach);
         while self.execute_next_event(&mut future, reach) {}
         let time = reach.time.clone();
-        let (mut situation, running) = situation_at(&future.belief, time, OverrunEstimate::QuarterLonger);
+        let (mut situation, running) =
+            situation_at(&future.belief, time, OverrunEstimate::QuarterLonger);
         if reach.late_actions == LateActionAssumption::QuarterLonger {
             // The quarter is measured from now, not from the time of the forecast.
             for (ticket, it) in running.iter().zip(&mut situation.running) {
@@ -147,7 +151,9 @@ impl Run<'_> {
                 continue;
             };
             let duration = entry.planned.clone().unwrap_or_default();
-            if let Some(begun) = belief_after_start(&belief, ticket, &entry.action, &self.now, &duration) {
+            if let Some(begun) =
+                belief_after_start(&belief, ticket, &entry.action, &self.now, &duration)
+            {
                 belief = begun;
                 ends.push((&self.now + duration, ticket, entry.step));
             }
@@ -167,7 +173,12 @@ impl Run<'_> {
     }
 
     /// Returns the expected end of a running action; `None` if it is not expected to end.
-    fn expected_end(&self, ticket: ActionHandle, underway: &RunningActionState, late: LateActionAssumption) -> Option<Rational> {
+    fn expected_end(
+        &self,
+        ticket: ActionHandle,
+        underway: &RunningActionState,
+        late: LateActionAssumption,
+    ) -> Option<Rational> {
         let planned = &underway.start + &underway.planned;
         if !self.is_due(underway) {
             return Some(planned);
@@ -194,8 +205,8 @@ impl Run<'_> {
             return Vec::new();
         }
         let steps = self.action_log.plan_steps().iter();
-        let left =
-            steps.filter(|(id, step)| step.start < *before && self.action_log.ticket(*id).is_none());
+        let left = steps
+            .filter(|(id, step)| step.start < *before && self.action_log.ticket(*id).is_none());
         let soonest = &self.now + self.task.epsilon();
         let left = left.map(|(id, step)| {
             let window = self.ports.executor.window(*id, false);
@@ -260,7 +271,9 @@ impl Run<'_> {
         for index in &now {
             let it = &future.to_come[*index];
             let duration = it.duration.clone().unwrap_or_default();
-            if let Some(begun) = belief_after_start(&future.belief, ticket, &it.action, &time, &duration) {
+            if let Some(begun) =
+                belief_after_start(&future.belief, ticket, &it.action, &time, &duration)
+            {
                 future.belief = begun;
                 let it = future.to_come.remove(*index);
                 future.start(it, ticket, time);

@@ -58,7 +58,8 @@ impl Run<'_> {
         self.work_queue.push(PendingStep::CheckTimeouts);
         let timeout = self.next_timeout().into_iter();
         let until = timeout.chain([until]).min().unwrap_or_default();
-        self.work_queue.push(PendingStep::Wait(until.max(self.now.clone())));
+        self.work_queue
+            .push(PendingStep::Wait(until.max(self.now.clone())));
         true
     }
 }

@@ -6,9 +6,9 @@ use std::sync::Arc;
 use elbowroom_model::{Situation, Task};
 use elbowroom_num::Rational;
 
-use super::work_queue::{FinishedPlan, PendingStep};
 use super::plan_start::PlanStart;
 use super::situation::{OverrunEstimate, situation_at};
+use super::work_queue::{FinishedPlan, PendingStep};
 use super::{MissingPlan, PlanningTime, Run, RunningRule, Stop, Verdict};
 use crate::event::ActionHandle;
 use crate::planning::{PlanAnswer, Planned};
@@ -41,7 +41,8 @@ impl Run<'_> {
         match self.settings.running {
             RunningRule::Keep => {
                 let lost = self.actions_that_cannot_continue();
-                self.work_queue.push(PendingStep::WaitForRunning(Some(lost.clone())));
+                self.work_queue
+                    .push(PendingStep::WaitForRunning(Some(lost.clone())));
                 self.work_queue.push(PendingStep::Cancel(lost));
             }
             RunningRule::Await => self.work_queue.push(PendingStep::WaitForRunning(None)),
@@ -96,7 +97,9 @@ impl Run<'_> {
         let breaking = self.belief.failing_actions().into_iter();
         let breaking: BTreeSet<ActionHandle> = breaking.map(|(ticket, _)| ticket).collect();
         let is_lost = |ticket: &ActionHandle| match self.belief.running().get(ticket) {
-            Some(underway) => breaking.contains(ticket) || !underway.violated_conjuncts().is_empty(),
+            Some(underway) => {
+                breaking.contains(ticket) || !underway.violated_conjuncts().is_empty()
+            }
             None => true,
         };
         self.action_log.open_tickets().filter(is_lost).collect()
@@ -133,7 +136,11 @@ impl Run<'_> {
     }
 
     /// Requests a plan, for which the run waits.
-    fn request_plan_with_estimate(&mut self, reason: &Reason, guess: OverrunEstimate) -> Result<(), Stop> {
+    fn request_plan_with_estimate(
+        &mut self,
+        reason: &Reason,
+        guess: OverrunEstimate,
+    ) -> Result<(), Stop> {
         let foreseen = self.anticipated_situation(guess);
         let foreseen = foreseen.map(|it| (it.prospect.situation, it.prospect.running));
         let (situation, running) =
@@ -163,7 +170,11 @@ impl Run<'_> {
 
     /// Processes the answer to an awaited request. The plan is adopted when its planning time has
     /// passed.
-    pub(super) fn process_planner_answer(&mut self, attempt: Attempt, planned: Planned) -> Result<(), Stop> {
+    pub(super) fn process_planner_answer(
+        &mut self,
+        attempt: Attempt,
+        planned: Planned,
+    ) -> Result<(), Stop> {
         let took = match &self.settings.planning_time {
             PlanningTime::Seconds(seconds) => seconds.clone(),
             // The world's clock starts when there is a first plan.
@@ -204,24 +215,29 @@ impl Run<'_> {
             answer => {
                 let next = self.next_attempt(attempt.guess);
                 return match next {
-                    NextAttempt::Guess(guess) => self.request_plan_with_estimate(&attempt.reason, guess),
+                    NextAttempt::Guess(guess) => {
+                        self.request_plan_with_estimate(&attempt.reason, guess)
+                    }
                     NextAttempt::CancelOverdue => {
                         self.cancel_overdue(attempt.reason);
                         Ok(())
                     }
-                    NextAttempt::ContinuePlan => self.continue_or_stop_without_plan(&answer, attempt.reason),
+                    NextAttempt::ContinuePlan => {
+                        self.continue_or_stop_without_plan(&answer, attempt.reason)
+                    }
                 };
             }
         };
         // Actions that end before the adoption belong to neither plan. Their effects are news, and
         // the new plan receives their ends.
         self.action_log.begin_plan(&BTreeMap::new());
-        self.work_queue.push(PendingStep::Adopt(Box::new(FinishedPlan {
-            plan,
-            situation: attempt.situation,
-            running: attempt.running,
-            ready,
-        })));
+        self.work_queue
+            .push(PendingStep::Adopt(Box::new(FinishedPlan {
+                plan,
+                situation: attempt.situation,
+                running: attempt.running,
+                ready,
+            })));
         Ok(())
     }
 
@@ -234,7 +250,9 @@ impl Run<'_> {
             // Overdue actions may still end in time.
             OverrunEstimate::QuarterLonger => NextAttempt::Guess(OverrunEstimate::AsSoonAsPossible),
             // They are only cancelled if there is a plan without them.
-            OverrunEstimate::AsSoonAsPossible if self.may_carry_on() => NextAttempt::Guess(OverrunEstimate::Cancelled),
+            OverrunEstimate::AsSoonAsPossible if self.may_carry_on() => {
+                NextAttempt::Guess(OverrunEstimate::Cancelled)
+            }
             OverrunEstimate::AsSoonAsPossible => NextAttempt::CancelOverdue,
             OverrunEstimate::Cancelled => NextAttempt::ContinuePlan,
         }
@@ -244,7 +262,8 @@ impl Run<'_> {
     pub(super) fn cancel_overdue(&mut self, reason: Reason) {
         let overdue = self.overdue();
         self.work_queue.push(PendingStep::Plan(reason));
-        self.work_queue.push(PendingStep::WaitForRunning(Some(overdue.clone())));
+        self.work_queue
+            .push(PendingStep::WaitForRunning(Some(overdue.clone())));
         self.work_queue.push(PendingStep::Cancel(overdue));
     }
 
@@ -275,7 +294,11 @@ impl Run<'_> {
 
     /// Returns the situation when the new plan can start: after the expected planning time, and ε
     /// after the last event before that.
-    pub(super) fn situation(&self, allowance: &Rational, guess: OverrunEstimate) -> (Situation, Vec<ActionHandle>) {
+    pub(super) fn situation(
+        &self,
+        allowance: &Rational,
+        guess: OverrunEstimate,
+    ) -> (Situation, Vec<ActionHandle>) {
         let epsilon = self.task.epsilon();
         let mut time = &self.now + allowance;
         // With other goals, the problem is a different one, and is written again for planners that
@@ -290,7 +313,11 @@ impl Run<'_> {
     }
 
     /// Returns the situation at this time, or ε after the timed initials that come just before it.
-    pub(super) fn situation_at(&self, time: Rational, guess: OverrunEstimate) -> (Situation, Vec<ActionHandle>) {
+    pub(super) fn situation_at(
+        &self,
+        time: Rational,
+        guess: OverrunEstimate,
+    ) -> (Situation, Vec<ActionHandle>) {
         if guess != OverrunEstimate::Cancelled {
             return situation_at(&self.belief, time, guess);
         }

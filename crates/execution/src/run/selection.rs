@@ -184,7 +184,7 @@ mod tests {
 
     use elbowroom_num::Rational;
 
-    use super::{MAX_EXACT_GOALS, Selection, GoalSet, SelectionStep};
+    use super::{GoalSet, MAX_EXACT_GOALS, Selection, SelectionStep};
 
     /// Goals of equal value.
     fn equal(count: usize) -> Vec<Rational> {
@@ -276,6 +276,9 @@ mod tests {
         assert_eq!(set, [0, 1, 2].into());
         let set = tried(selection.after_failure(set));
         assert_eq!(set, [0, 1, 3].into());
-        assert_eq!(selection.after_success(set), SelectionStep::Select([0, 1, 3].into()));
+        assert_eq!(
+            selection.after_success(set),
+            SelectionStep::Select([0, 1, 3].into())
+        );
     }
 }

@@ -7,7 +7,7 @@ use super::Run;
 use super::goals::OpenGoal;
 use super::snapshot::{GivenGoal, Goals};
 use crate::planning::Shortfall;
-use crate::reason::{Subject, Cause, Reason};
+use crate::reason::{Cause, Reason, Subject};
 
 /// Goals that exclude each other.
 pub(super) struct Conflict {
@@ -49,7 +49,11 @@ impl Run<'_> {
         if !shortfall.conflict.is_empty() {
             lasting.conflicts.push(shortfall.conflict.clone());
         }
-        let pursued: Vec<&GivenGoal> = goals.open.iter().filter(|it| it.set_aside.is_none()).collect();
+        let pursued: Vec<&GivenGoal> = goals
+            .open
+            .iter()
+            .filter(|it| it.set_aside.is_none())
+            .collect();
         let is_alone = pursued.len() == 1;
         let with_deadlines = pursued.iter().filter(|it| it.terms.deadline.is_some());
         for late in &shortfall.missed_deadlines {

@@ -6,7 +6,7 @@ use super::work_queue::PendingStep;
 use super::{Next, Report, Run, Stop, Verdict};
 use crate::event::ActionHandle;
 use crate::executor::PlanEvent;
-use crate::reason::{Subject, Cause, Reason};
+use crate::reason::{Cause, Reason, Subject};
 use crate::record::Entry;
 
 /// Time that cancelled actions have to stop at the end of a run, in seconds of the world's clock.
@@ -81,7 +81,8 @@ impl Run<'_> {
         }
         self.clock_watchdog.begin_plan();
         // Immediate ends are reported at once.
-        self.work_queue.push(PendingStep::ShutDown(self.now.clone()));
+        self.work_queue
+            .push(PendingStep::ShutDown(self.now.clone()));
         let running = open.into_iter();
         let running = running.filter(|ticket| !self.action_log.is_cancelled(*ticket));
         self.work_queue.push(PendingStep::Cancel(running.collect()));

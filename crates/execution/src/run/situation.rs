@@ -6,8 +6,8 @@ use elbowroom_model::validate::{Settings, validate_from};
 use elbowroom_model::{RunningAction, Situation, Step, Task, TimeTriggeredPlan};
 use elbowroom_num::{Interval, Rational};
 
-use crate::event::ActionHandle;
 use crate::belief_state::BeliefState;
+use crate::event::ActionHandle;
 
 /// Estimated end time of an overdue action, for replanning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,7 +48,9 @@ pub fn situation_at(
             let elapsed = &time - &underway.start;
             let expected = match guess {
                 _ if underway.planned > elapsed => underway.planned.clone(),
-                OverrunEstimate::QuarterLonger => quarter_longer_end(&state, *ticket, &time) - &underway.start,
+                OverrunEstimate::QuarterLonger => {
+                    quarter_longer_end(&state, *ticket, &time) - &underway.start
+                }
                 OverrunEstimate::AsSoonAsPossible | OverrunEstimate::Cancelled => elapsed + epsilon,
             };
             state.running_action(underway, Interval::point(expected))

@@ -65,8 +65,11 @@ impl Run<'_> {
             return Some(late);
         }
         let later = self.ports.executor.bears_until(late.step, &self.now);
-        let until = later.into_iter().fold(late.window_end.clone(), Rational::max);
-        self.action_log.record_latest_tolerable_end(late.ticket, late.window_end, until);
+        let until = later
+            .into_iter()
+            .fold(late.window_end.clone(), Rational::max);
+        self.action_log
+            .record_latest_tolerable_end(late.ticket, late.window_end, until);
         self.late_action(late.ticket)
     }
 

@@ -15,14 +15,14 @@ use elbowroom_model::{Situation, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
 use super::action_log::KnownStart;
-use super::work_queue::PendingStep;
-use super::plan_start::PlanStart;
 use super::goals::OpenGoal;
 use super::kept_goals::Wait;
+use super::plan_start::PlanStart;
+use super::work_queue::PendingStep;
 use super::{RefusalBackoff, Run, Verdict};
-use crate::event::{GoalTerms, ActionHandle};
-use crate::executor::PlanEvent;
 use crate::belief_state::BeliefState;
+use crate::event::{ActionHandle, GoalTerms};
+use crate::executor::PlanEvent;
 
 /// Snapshot of an executive that adopts a plan, or is idle with no action running.
 #[derive(Clone, Debug)]
@@ -266,7 +266,8 @@ impl Run<'_> {
             RunPhase::Adopting(takes_up) => {
                 let task = self.task_with_goals(&problem, &takes_up.goals);
                 self.restore_goal_change(takes_up.pending_goal_change.clone());
-                self.work_queue.push(PendingStep::RestoreAdoption(task, takes_up));
+                self.work_queue
+                    .push(PendingStep::RestoreAdoption(task, takes_up));
             }
         }
         self

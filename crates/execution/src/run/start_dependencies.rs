@@ -35,7 +35,10 @@ pub(super) fn start_dependencies(mission: &PreparedPlan) -> BTreeMap<StepId, Vec
         // Simultaneous starts do not wait for each other.
         let follows = moment.1 || mission.nominal[earlier] < mission.nominal[later];
         if moment.0 != step && (least.is_positive() || (least.is_zero() && follows)) {
-            waits.entry(step).or_default().push(StartDependency { event: moment, min_delay: least });
+            waits.entry(step).or_default().push(StartDependency {
+                event: moment,
+                min_delay: least,
+            });
         }
     };
     for constraint in plan.constraints_at(&mission.plan.nominal()) {

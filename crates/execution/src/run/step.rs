@@ -6,7 +6,7 @@ use elbowroom_num::{Rational, work};
 use super::work_queue::PendingStep;
 use super::{Report, Run, Stop, Verdict};
 use crate::event::{Command, Observation};
-use crate::reason::{Subject, Cause, Reason};
+use crate::reason::{Cause, Reason, Subject};
 use crate::record::Entry;
 use crate::request::{PlanRequest, PrepareRequest, RequestId, Workers};
 use crate::world::{TimeAdvance, World, WorldError};
@@ -148,7 +148,10 @@ impl Run<'_> {
     ///
     /// # Errors
     /// If the run has not requested them. They are ignored then.
-    pub fn observe_requested(&mut self, observations: Vec<Observation>) -> Result<(), UnexpectedAnswer> {
+    pub fn observe_requested(
+        &mut self,
+        observations: Vec<Observation>,
+    ) -> Result<(), UnexpectedAnswer> {
         if !matches!(self.open_request, Some(Next::Look { .. })) {
             let what = "a look";
             return Err(UnexpectedAnswer { what });
@@ -179,7 +182,9 @@ impl Run<'_> {
         if is_equal_up_to_rounding(&passage.now, &until) {
             passage.now.clone_from(&until);
         }
-        passage.observations.extend(self.take_arrived_answers(&passage.now));
+        passage
+            .observations
+            .extend(self.take_arrived_answers(&passage.now));
         self.ports.recorder.record(&Entry::Passed {
             until: &until,
             now: &passage.now,

@@ -187,7 +187,9 @@ impl fmt::Display for TimeoutRule {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Off => f.write_str(Self::OFF),
-            Self::After { factor, at_least } if factor.is_zero() => f.write_str(&format_number(at_least)),
+            Self::After { factor, at_least } if factor.is_zero() => {
+                f.write_str(&format_number(at_least))
+            }
             Self::After { factor, at_least } => {
                 write!(f, "{}x,{}", format_number(factor), format_number(at_least))
             }
@@ -283,7 +285,8 @@ impl Run<'_> {
         let limits: Vec<ActionTimeout> = self.action_timeouts().collect();
         let (expired, running): (Vec<_>, Vec<_>) =
             limits.into_iter().partition(|limit| limit.until < self.now);
-        let is_due = |limit: &&ActionTimeout| limit.warn.as_ref().is_some_and(|warn| *warn <= self.now);
+        let is_due =
+            |limit: &&ActionTimeout| limit.warn.as_ref().is_some_and(|warn| *warn <= self.now);
         for limit in running.iter().filter(is_due) {
             let Some(entry) = self.action_log.get(limit.ticket) else {
                 continue;

@@ -9,8 +9,8 @@ use elbowroom_num::Rational;
 use super::plan_start::{PlanStart, preparation_failure};
 use super::snapshot::PlanAdoption;
 use super::{Next, Run, Stop};
-use crate::event::{Command, ActionHandle};
-use crate::executor::{PreparedPlan, PlanEvent};
+use crate::event::{ActionHandle, Command};
+use crate::executor::{PlanEvent, PreparedPlan};
 use crate::preparation::PrepareError;
 use crate::reason::{Cause, Reason};
 
@@ -70,7 +70,9 @@ impl Run<'_> {
                 // A given plan is not shifted, unlike the remaining steps of a late plan.
                 let verdict = validate(&self.task, &plan, &validate::Settings::default());
                 if let Verdict::Invalid(violation) = verdict {
-                    return Err(preparation_failure(&PrepareError::Invalid(Box::new(violation))));
+                    return Err(preparation_failure(&PrepareError::Invalid(Box::new(
+                        violation,
+                    ))));
                 }
                 let situation = Situation::initial(&self.task);
                 self.adopt_plan(PlanStart::of(&plan, &situation, &[]));
@@ -95,7 +97,8 @@ impl Run<'_> {
             PendingStep::Adopt(made) => self.adopt(made),
             PendingStep::AdoptPrepared(mission) => self.begin_prepared_plan(&mission)?,
             PendingStep::RestoreAdoption(task, it) => {
-                self.work_queue.push(PendingStep::ReportNews(it.plan_events.clone()));
+                self.work_queue
+                    .push(PendingStep::ReportNews(it.plan_events.clone()));
                 let course = PlanStart {
                     plan: &it.plan,
                     situation: &it.situation,

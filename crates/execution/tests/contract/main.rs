@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use elbowroom_execution::executors::{EXECUTORS, OrderCache};
 use elbowroom_execution::run::{Next, Report, Run, RunSettings, Verdict};
 use elbowroom_execution::{
-    Command, Entry, TimeAdvance, PortWorkers, Recorder, ActionHandle, World, WorldError,
+    ActionHandle, Command, Entry, PortWorkers, Recorder, TimeAdvance, World, WorldError,
 };
 use elbowroom_num::Rational;
 use scene::{Scene, ToyWorld, WorldFaults};

@@ -2,11 +2,14 @@
 
 use std::sync::Arc;
 
-use elbowroom_execution::executors::{ExecutorSpec, PolicyTableCache, ExecutorServices, OrderCache};
+use elbowroom_execution::executors::{
+    ExecutorServices, ExecutorSpec, OrderCache, PolicyTableCache,
+};
 use elbowroom_execution::run::{Ports, Run, RunSettings};
 use elbowroom_execution::{
-    Command, Ending, Event, DispatchableCache, PlanForm, NoPlanner, Observation, TimeAdvance, PortWorkers,
-    PrepareError, PreparationResult, Preparer, Recorder, RegionOracle, ActionHandle, World, WorldError,
+    ActionHandle, Command, DispatchableCache, Ending, Event, NoPlanner, Observation, PlanForm,
+    PortWorkers, PreparationResult, PrepareError, Preparer, Recorder, RegionOracle, TimeAdvance,
+    World, WorldError,
 };
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::{Interval, Rational};
@@ -120,7 +123,12 @@ impl Preparer for ManualPreparer {
 struct UnlimitedRegion;
 
 impl RegionOracle for UnlimitedRegion {
-    fn find_violation(&mut self, _: &Arc<Task>, _: &ParametrizedPlan, _: &Valuation) -> Option<String> {
+    fn find_violation(
+        &mut self,
+        _: &Arc<Task>,
+        _: &ParametrizedPlan,
+        _: &Valuation,
+    ) -> Option<String> {
         None
     }
 }

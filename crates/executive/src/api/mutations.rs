@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::time::Duration;
 
 use elbowroom::execution::run::PROBLEM_GOAL_NAME;
-use elbowroom::execution::{GoalTerms, Request, ActionHandle};
+use elbowroom::execution::{ActionHandle, GoalTerms, Request};
 use elbowroom::executive::documents::{
     Activity, NewFact, NewGoal, NewNumber, NewOutcome, NewProblem, State, Taken,
 };

@@ -241,7 +241,10 @@ impl ApiRouter {
             }
             ("GET", "/v1/state/events") => {
                 let begun = respond_with_events(stream);
-                begun.and_then(|()| self.buffer.with_listener_count(|| self.stream_state(stream)))
+                begun.and_then(|()| {
+                    self.buffer
+                        .with_listener_count(|| self.stream_state(stream))
+                })
             }
             ("GET", "/v1/events") => {
                 let after = first_line(request)?;

@@ -73,7 +73,8 @@ fn socket(path: &Path) -> Result<Listener, Error> {
     }
     let listener = UnixListener::bind(path).map_err(|error| cannot(&io_error_message(&error)))?;
     let owner_only = std::fs::Permissions::from_mode(0o600);
-    std::fs::set_permissions(path, owner_only).map_err(|error| cannot(&io_error_message(&error)))?;
+    std::fs::set_permissions(path, owner_only)
+        .map_err(|error| cannot(&io_error_message(&error)))?;
     Ok(Listener::Unix(listener))
 }
 

@@ -57,8 +57,11 @@ fn steps(answer: PlanAnswer) -> Vec<(String, Rational)> {
 fn plan_in_advance_equals_awaited_plan() {
     let ((spec, task), asked) = (delivery(), AtomicUsize::new(0));
     let situation = Situation::initial(&task);
-    let mut planner =
-        BackgroundPlanner::new(Box::new(CountingPlanner(&asked)), &spec, &settings(&Stop::default()));
+    let mut planner = BackgroundPlanner::new(
+        Box::new(CountingPlanner(&asked)),
+        &spec,
+        &settings(&Stop::default()),
+    );
     planner.expect(&task, &situation);
     let made = steps(planner.plan(&task, &situation).answer);
     assert_eq!(asked.load(Ordering::SeqCst), 0);
@@ -79,7 +82,8 @@ fn plan_for_other_situation_is_discarded() {
     let mut later = situation.clone();
     later.time = Rational::from(1);
     let stop = Stop::default();
-    let mut planner = BackgroundPlanner::new(Box::new(CountingPlanner(&asked)), &spec, &settings(&stop));
+    let mut planner =
+        BackgroundPlanner::new(Box::new(CountingPlanner(&asked)), &spec, &settings(&stop));
     planner.expect(&task, &later);
     assert!(!steps(planner.plan(&task, &situation).answer).is_empty());
     assert_eq!(asked.load(Ordering::SeqCst), 1);

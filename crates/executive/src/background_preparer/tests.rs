@@ -1,9 +1,11 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use elbowroom::execute::{PlanPreparer, Embedded, RunSpec};
+use elbowroom::execute::{Embedded, PlanPreparer, RunSpec};
 use elbowroom::execution::executors::ExecutorSpec;
-use elbowroom::execution::{PreparedPlan, PlanForm, PlanAnswer, Planner, Preparer, PreparationRequest};
+use elbowroom::execution::{
+    PlanAnswer, PlanForm, Planner, PreparationRequest, PreparedPlan, Preparer,
+};
 use elbowroom::model::{Situation, Task};
 use elbowroom::num::Rational;
 

@@ -34,7 +34,10 @@ impl AccessControl {
         });
         let is_shared = read.map_err(|error| {
             Error::new(
-                format!("cannot read the token in {name}: {}", io_error_message(&error)),
+                format!(
+                    "cannot read the token in {name}: {}",
+                    io_error_message(&error)
+                ),
                 format!(
                     "the option names a file with a token in it; {}",
                     token_file_advice(path)

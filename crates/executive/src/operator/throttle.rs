@@ -46,9 +46,7 @@ impl SimulationThrottle {
             self.lead = Duration::ZERO;
             return Duration::ZERO;
         }
-        self.lead = (self.lead + passed)
-            .saturating_sub(elapsed)
-            .min(MAX_DELAY);
+        self.lead = (self.lead + passed).saturating_sub(elapsed).min(MAX_DELAY);
         if has_slept {
             return Duration::ZERO;
         }

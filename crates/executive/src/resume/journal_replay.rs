@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
-use elbowroom::answers::{StopRequest, Observer};
+use elbowroom::answers::{Observer, StopRequest};
 use elbowroom::execution::run::RunSnapshot;
 use elbowroom::execution::{Entry, Planner, PlannerAnswer, Recorder};
 use elbowroom::model::{Situation, Task};

@@ -3,7 +3,9 @@
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use elbowroom_execution::{Decided, Executor, PreparedPlan, DecisionContext, PlanForm, Planned, Reason, StepId};
+use elbowroom_execution::{
+    Decided, DecisionContext, Executor, PlanForm, Planned, PreparedPlan, Reason, StepId,
+};
 
 /// Decision times.
 #[derive(Clone, Default)]

@@ -8,9 +8,9 @@ use elbowroom_report::statistics::{Mean, Proportion};
 use elbowroom_report::table::Table;
 use serde::{Deserialize, Serialize};
 
-use super::initial_plans::{self, FirstPlanNote};
 use super::clairvoyant;
 use super::experiment::CLAIRVOYANT;
+use super::initial_plans::{self, FirstPlanNote};
 use super::optimum::{self, ColumnOptimum};
 use super::parts::{self, Partial, fingerprint};
 use super::{Experiment, Failures, Part, TrialId};
@@ -225,7 +225,8 @@ impl Results {
             }
             cells
         });
-        let mut made = parts::describe_trials(self.trials, "each problem", self.shards, &self.parts);
+        let mut made =
+            parts::describe_trials(self.trials, "each problem", self.shards, &self.parts);
         if self.is_interrupted {
             // All rows have the same trials.
             let made_here = self.cells.first().map_or(0, |row| {

@@ -15,8 +15,9 @@ use super::initial_plans::FirstPlanNote;
 use super::trials::{PLAN_CACHE_SIZE, PREPARED_CACHE_SIZE, Setting, believed_world, world};
 use super::{Column, ExperimentError, Planning};
 use elbowroom::execute::{
-    ActionSets, PlanPreparer, Choice, PlanSelector, WorldKnowledge, MostProbablePlanner, RolloutPolicy, CachingPlanner,
-    CachingPreparer, Replanning, Rollouts, SharedMostProbablePlanner, SharedRolloutPolicy,
+    ActionSets, CachingPlanner, CachingPreparer, Choice, MostProbablePlanner, PlanPreparer,
+    PlanSelector, Replanning, RolloutPolicy, Rollouts, SharedMostProbablePlanner,
+    SharedRolloutPolicy, WorldKnowledge,
 };
 use elbowroom::timed::{Policy, Settings};
 

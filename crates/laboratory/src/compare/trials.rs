@@ -16,12 +16,12 @@ use elbowroom_sim::WorldModel;
 
 use super::scenario::Scenario;
 use super::{
-    Column, Experiment, ExperimentError, Part, Planning, Results, TrialId, initial_plans, clairvoyant,
+    Column, Experiment, ExperimentError, Part, Planning, Results, TrialId, clairvoyant,
+    initial_plans,
 };
 use elbowroom::answers::envelope::Search;
 use elbowroom::execute::{
-    Embedded, Execution, NamedText, CachingPlanner, RunSpec, SpecError, Validated,
-    planning_work,
+    CachingPlanner, Embedded, Execution, NamedText, RunSpec, SpecError, Validated, planning_work,
 };
 use elbowroom::{RoundingRule, pipeline};
 
@@ -119,7 +119,11 @@ impl Setting<'_> {
     }
 
     /// Reads the plan that the experiment names.
-    fn read_given_plan(&self, task: &Task, text: &str) -> Result<TimeTriggeredPlan, ExperimentError> {
+    fn read_given_plan(
+        &self,
+        task: &Task,
+        text: &str,
+    ) -> Result<TimeTriggeredPlan, ExperimentError> {
         let (plan, _) = RoundingRule::default()
             .read_plan(&Source::new("plan", text), task)
             .map_err(ExperimentError::Text)?;
@@ -398,7 +402,10 @@ impl Setting<'_> {
     }
 
     /// Returns the problem, and the world of a column for it.
-    pub(super) fn problem_and_world(&self, column: &Column) -> Result<(Task, WorldModel), ExperimentError> {
+    pub(super) fn problem_and_world(
+        &self,
+        column: &Column,
+    ) -> Result<(Task, WorldModel), ExperimentError> {
         let (domain, problem) = self.texts()?;
         let task = Self::task(&domain, &problem)?;
         let world = world(column, &task)?;
@@ -423,7 +430,10 @@ impl Setting<'_> {
         if self.filling.is_empty() {
             return ExperimentError::other(format!("the problem: {message}"));
         }
-        ExperimentError::other(format!("the problem with {}: {message}", self.describe_blanks()))
+        ExperimentError::other(format!(
+            "the problem with {}: {message}",
+            self.describe_blanks()
+        ))
     }
 }
 

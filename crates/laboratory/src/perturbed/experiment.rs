@@ -334,7 +334,10 @@ impl PerturbedExperiment {
         let mut cases = Vec::new();
         for name in &read.include {
             let text = read_named(&source, name, file)?;
-            cases.extend(Self::read_included(&Source::new(name.get_ref(), text), file)?);
+            cases.extend(Self::read_included(
+                &Source::new(name.get_ref(), text),
+                file,
+            )?);
         }
         cases.extend(own_cases(&source, &read, file)?);
         if cases.is_empty() {

@@ -5,7 +5,7 @@ use elbowroom_model::ground::FactId;
 use serde::{Deserialize, Serialize};
 
 use super::{PerturbedError, Setting, WorldKind};
-use crate::untimed::{StepRecord, Entry, ExecutorName, StepKind};
+use crate::untimed::{Entry, ExecutorName, StepKind, StepRecord};
 
 const FORMAT: &str = "elbowroom-course";
 

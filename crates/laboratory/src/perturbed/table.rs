@@ -20,7 +20,9 @@ pub fn table(results: &PerturbedResults) -> Table {
     }
     let rows = &results.rows;
     let caption = [title].into_iter();
-    let caption = caption.chain(describe_agreement(rows)).chain(describe_ratio_to_optimum(rows));
+    let caption = caption
+        .chain(describe_agreement(rows))
+        .chain(describe_ratio_to_optimum(rows));
     let interval = |row: &Row| {
         let interval = row.success.wilson();
         let interval =

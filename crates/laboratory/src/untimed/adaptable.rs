@@ -10,7 +10,7 @@ use elbowroom_plan::partial_order::partial_order;
 use elbowroom_plan::{InstanceId, Node, NodeId};
 use elbowroom_probability::dispatch::{goal_holds, lattermost_layer, never_interrupt};
 use elbowroom_probability::{
-    Candidates, SearchState, Likelihoods, Model, OrderSearch, Running, SearchSettings, Semantics,
+    Candidates, Likelihoods, Model, OrderSearch, Running, SearchSettings, SearchState, Semantics,
     TotalOrderPlan,
 };
 
@@ -167,7 +167,12 @@ impl Prepared {
         chosen
     }
 
-    fn compute_choice(&mut self, order: Option<usize>, now: &SearchState, is_dead_end: bool) -> Chosen {
+    fn compute_choice(
+        &mut self,
+        order: Option<usize>,
+        now: &SearchState,
+        is_dead_end: bool,
+    ) -> Chosen {
         let stop = Chosen { next: None, order };
         if now.running.is_empty() && goal_holds(self.search.model(), now) {
             return stop;
@@ -219,7 +224,10 @@ impl Prepared {
     /// Returns the first happening of the order most likely to succeed with the help of spontaneous
     /// changes.
     fn next_by_spontaneous_change(&mut self, now: &SearchState) -> Option<NodeId> {
-        let found = self.change_search.best_order(now, &mut never_interrupt).ok()?;
+        let found = self
+            .change_search
+            .best_order(now, &mut never_interrupt)
+            .ok()?;
         found.order?.sequence.first().copied()
     }
 }

@@ -7,7 +7,7 @@ use elbowroom_model::ground::Action;
 use elbowroom_model::{State, Task, TimeTriggeredPlan};
 use elbowroom_plan::{InstanceId, PartialOrderPlan};
 use elbowroom_probability::likelihoods::Missing;
-use elbowroom_probability::optimum::{Move, TabulationError, Optimum, Perturbed, Settings};
+use elbowroom_probability::optimum::{Move, Optimum, Perturbed, Settings, TabulationError};
 use elbowroom_probability::{Likelihoods, Model, Semantics};
 
 use super::adaptable::{circumstances, execute_happening};

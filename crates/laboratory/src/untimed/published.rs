@@ -10,7 +10,7 @@ use elbowroom_probability::{
     Likelihoods, Model, OrderSearch, PrunedNetwork, SearchSettings, Semantics, TotalOrderPlan,
 };
 
-use super::adaptable::{circumstances, model, execute_happening};
+use super::adaptable::{circumstances, execute_happening, model};
 use super::{InstrumentedWorld, UntimedExecutor, apply, holds, start_of};
 
 /// The published program, with the faults on which its results depend:

@@ -11,7 +11,9 @@ use elbowroom_probability::{Likelihoods, Semantics};
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use super::{Adaptable, PublishedExecutor, Esterel, LookaheadPolicy, NotTabulated, UntimedExecutor};
+use super::{
+    Adaptable, Esterel, LookaheadPolicy, NotTabulated, PublishedExecutor, UntimedExecutor,
+};
 
 /// Registry entry of an executor: name, documentation and constructor.
 #[derive(Clone, Copy)]
@@ -112,7 +114,10 @@ impl ExecutorName {
     ///
     /// # Errors
     /// It needs a table of the world, and there can be none.
-    pub fn build(self, means: &ExecutorServices<'_>) -> Result<Box<dyn UntimedExecutor>, NotTabulated> {
+    pub fn build(
+        self,
+        means: &ExecutorServices<'_>,
+    ) -> Result<Box<dyn UntimedExecutor>, NotTabulated> {
         (self.entry().construct)(means)
     }
 }

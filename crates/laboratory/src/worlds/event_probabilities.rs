@@ -6,7 +6,7 @@ use elbowroom_model::Task;
 use elbowroom_model::ground::{Action, Body, Change, FactId, SnapAction};
 use elbowroom_model::problem::{ObjectId, SchemaId};
 use elbowroom_probability::likelihoods::{FailureOutcome, Missing};
-use elbowroom_probability::{SpontaneousChange, Likelihoods};
+use elbowroom_probability::{Likelihoods, SpontaneousChange};
 
 /// Random events of a perturbed world, with their probabilities.
 #[derive(Clone, Debug)]

@@ -7,7 +7,7 @@ use elbowroom_probability::likelihoods::FailureOutcome;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-use super::event_probabilities::{EventProbabilities, EffectProbability};
+use super::event_probabilities::{EffectProbability, EventProbabilities};
 use elbowroom_sim::draw::{Purpose, keyed};
 
 /// World with independent draws.

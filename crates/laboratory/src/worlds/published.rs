@@ -9,7 +9,7 @@ use elbowroom_model::{State, Task};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-use super::event_probabilities::{EventProbabilities, EffectProbability};
+use super::event_probabilities::{EffectProbability, EventProbabilities};
 use super::rand_c::RandC;
 use elbowroom_sim::draw::{Purpose, keyed};
 

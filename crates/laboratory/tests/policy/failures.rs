@@ -11,7 +11,7 @@ use elbowroom_execution::{PlanAnswer, Planner};
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_pddl::{Source, read_problem};
 use elbowroom_probability::optimum::PolicyTable;
-use elbowroom_probability::{SearchState, Likelihoods, likelihoods};
+use elbowroom_probability::{Likelihoods, SearchState, likelihoods};
 use elbowroom_sim::WorldModel;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

@@ -66,7 +66,10 @@ impl Grounder<'_> {
         binding: &mut Vec<ObjectId>,
         action: &mut dyn FnMut(&mut Self, &mut Vec<ObjectId>),
     ) {
-        if conjuncts.iter().any(|part| facts.is_ruled_out(part, binding)) {
+        if conjuncts
+            .iter()
+            .any(|part| facts.is_ruled_out(part, binding))
+        {
             return;
         }
         let Some(next) = parameters.get(binding.len()) else {

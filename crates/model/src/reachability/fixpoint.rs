@@ -16,7 +16,7 @@ use super::event::{Event, Symbol};
 use super::join::{Trigger, join};
 use super::relaxation::Relaxation;
 use super::rule::{Head, Rule};
-use super::watch_lists::{Pending, EntryId, WatchLists};
+use super::watch_lists::{EntryId, Pending, WatchLists};
 use crate::hash::Set;
 
 /// Objects for a schema's parameters.

@@ -4,13 +4,14 @@ use std::collections::BTreeSet;
 
 use elbowroom_num::Rational;
 
+use super::evaluate::Fault;
 use super::judge::Judge;
 use super::segment::Falsification;
-use super::evaluate::Fault;
 use super::state::BasicState;
 use super::timeline::{Group, HappeningKind};
 use super::violation::{
-    ActionInstance, UndecidedReason, ViolationKind, Occurrence, Point, Undecided, Violation, ConditionTime,
+    ActionInstance, ConditionTime, Occurrence, Point, Undecided, UndecidedReason, Violation,
+    ViolationKind,
 };
 use crate::ground::{Change, Condition, DurationConstraint, Expression, FluentId};
 use crate::task::Task;
@@ -98,7 +99,12 @@ impl<'a> EvaluationContext<'a> {
 
 impl<'a> Judge<'a> {
     /// Returns a violation of a step, or of the goal.
-    pub(super) fn violation(&self, time: &Rational, step: Option<usize>, mistake: ViolationKind) -> Abort {
+    pub(super) fn violation(
+        &self,
+        time: &Rational,
+        step: Option<usize>,
+        mistake: ViolationKind,
+    ) -> Abort {
         let action = step.map(|position| self.instance(position));
         Abort::Violation(Box::new(Violation {
             time: time.clone(),
@@ -122,7 +128,9 @@ impl<'a> Judge<'a> {
                 HappeningKind::Event(_) => Point::Event,
             },
             event: match what {
-                HappeningKind::Event(event) => Some(self.task.autonomous().events[event].name.clone()),
+                HappeningKind::Event(event) => {
+                    Some(self.task.autonomous().events[event].name.clone())
+                }
                 _ => None,
             },
             action: what.step().map(|position| self.instance(position)),
@@ -131,7 +139,12 @@ impl<'a> Judge<'a> {
 
     /// Returns the violation for a condition at `place` that is false in the state `then`; for
     /// over-all conditions, from the moment `broken` on.
-    pub(super) fn fails(&self, place: &EvaluationContext<'_>, then: &BasicState, broken: Option<&Falsification>) -> Abort {
+    pub(super) fn fails(
+        &self,
+        place: &EvaluationContext<'_>,
+        then: &BasicState,
+        broken: Option<&Falsification>,
+    ) -> Abort {
         let Subject::Condition(when, condition) = place.subject else {
             unreachable!("only conditions fail");
         };

@@ -20,17 +20,17 @@ use std::collections::BTreeSet;
 
 use elbowroom_num::Rational;
 
+use super::abort::{Abort, EvaluationContext};
 use super::effects;
+use super::evaluate::{Fault, evaluate};
 use super::instant::Instant;
 use super::interference::over;
 use super::judge::Judge;
-use super::segment::{Segment, SegmentPart};
 use super::polynomial::Polynomial;
-use super::evaluate::{Fault, evaluate};
-use super::state::{Motion, BasicState, Rate};
-use super::abort::{EvaluationContext, Abort};
+use super::segment::{Segment, SegmentPart};
+use super::state::{BasicState, Motion, Rate};
 use super::timeline::{Group, HappeningKind};
-use super::violation::{UndecidedReason, ViolationKind, Undecided, ConditionTime};
+use super::violation::{ConditionTime, Undecided, UndecidedReason, ViolationKind};
 use crate::autonomous::{Autonomous, GroundEvent};
 use crate::ground::{Change, Condition, Expression, FactId, FluentId};
 use crate::interference::Footprint;
@@ -117,7 +117,11 @@ impl<'a> Judge<'a> {
 
     /// Applies processes and events from just after the group at `from` to the arrival at the next
     /// one.
-    pub(super) fn advance_with_autonomous(&mut self, from: &Rational, to: &Rational) -> Result<(), Abort> {
+    pub(super) fn advance_with_autonomous(
+        &mut self,
+        from: &Rational,
+        to: &Rational,
+    ) -> Result<(), Abort> {
         let mut flow = Flow::beginning(from);
         self.forget_events_before(from);
         for _ in 0..MAX_CHANGES {
@@ -142,11 +146,19 @@ impl<'a> Judge<'a> {
             }
         }
         let most = MAX_CHANGES;
-        Err(undecided(&flow.time(), UndecidedReason::ManyChanges { most }))
+        Err(undecided(
+            &flow.time(),
+            UndecidedReason::ManyChanges { most },
+        ))
     }
 
     /// Checks over-all conditions and constraints throughout a part.
-    fn check_throughout(&mut self, flow: &Flow, length: &Rational, part: &SegmentPart) -> Result<(), Abort> {
+    fn check_throughout(
+        &mut self,
+        flow: &Flow,
+        length: &Rational,
+        part: &SegmentPart,
+    ) -> Result<(), Abort> {
         self.watch_over_all(&flow.base, &flow.motion, length, Some(part))?;
         self.record_phases(&flow.base, &flow.motion, length, Some(part))
     }
@@ -223,8 +235,9 @@ impl<'a> Judge<'a> {
                 }));
             }
             let mut now = self.now.clone();
-            let motion = Motion::continued_from(&mut now, &flow.motion, &rates, &flow.at)
-                .map_err(|(step, fault)| self.to_abort(fault, &EvaluationContext::rate(&time, step)))?;
+            let motion = Motion::continued_from(&mut now, &flow.motion, &rates, &flow.at).map_err(
+                |(step, fault)| self.to_abort(fault, &EvaluationContext::rate(&time, step)),
+            )?;
             let mut then = Vec::with_capacity(processes.len());
             let read = Read::After(&now, &motion, length);
             for process in processes {
@@ -256,7 +269,12 @@ impl<'a> Judge<'a> {
         let piece = self.piece(&self.now, &flow.motion, length, Some(&part));
         let mut next: Option<Instant> = None;
         for condition in self.conditions() {
-            let place = EvaluationContext::condition(&flow.base, None, ConditionTime::Trajectory, condition);
+            let place = EvaluationContext::condition(
+                &flow.base,
+                None,
+                ConditionTime::Trajectory,
+                condition,
+            );
             let (_, turn) = piece
                 .turn(condition)
                 .map_err(|fault| self.to_abort(fault, &place))?;
@@ -346,7 +364,8 @@ impl<'a> Judge<'a> {
             for (fact, event) in facts {
                 let old = std::mem::replace(&mut self.now.facts[fact.index()], truth);
                 if old != truth {
-                    self.last_changes.insert(fact, (time.clone(), HappeningKind::Event(event)));
+                    self.last_changes
+                        .insert(fact, (time.clone(), HappeningKind::Event(event)));
                 }
             }
         }

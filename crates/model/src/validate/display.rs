@@ -5,7 +5,8 @@ use std::fmt;
 use elbowroom_num::Rational;
 
 use super::violation::{
-    ActionInstance, UndecidedReason, ViolationKind, Occurrence, Point, Reason, Undecided, Violation, ConditionTime,
+    ActionInstance, ConditionTime, Occurrence, Point, Reason, Undecided, UndecidedReason,
+    Violation, ViolationKind,
 };
 use crate::describe::decimal;
 use crate::problem::Comparison;

@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 
 use elbowroom_num::Rational;
 
-use super::judge::Judge;
+use super::abort::{Abort, EvaluationContext};
 use super::evaluate::Fault;
+use super::judge::Judge;
 use super::state::Rate;
-use super::abort::{EvaluationContext, Abort};
 use super::timeline::{Group, HappeningKind};
-use super::violation::{ViolationKind, ConditionTime};
+use super::violation::{ConditionTime, ViolationKind};
 use crate::ground::{Change, Effect, Expression, FactId, FluentId};
 use crate::problem::UpdateOperator;
 
@@ -119,7 +119,8 @@ impl<'a> Judge<'a> {
         {
             return Ok(false);
         }
-        let place = EvaluationContext::condition(time, what.step(), ConditionTime::Now, &effect.guard.now);
+        let place =
+            EvaluationContext::condition(time, what.step(), ConditionTime::Now, &effect.guard.now);
         self.reads(&effect.guard.now, what.step())
             .map_err(|fault| self.to_abort(fault, &place))
     }

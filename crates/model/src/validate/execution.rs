@@ -29,14 +29,14 @@ use elbowroom_num::{Interval, Rational};
 
 use super::interference::over;
 use super::segment::Segment;
-use super::violation::{ActionInstance, ViolationKind, Occurrence, Point, Violation};
+use super::violation::{ActionInstance, Occurrence, Point, Violation, ViolationKind};
 use crate::derivation::{Derivation, holds};
 use crate::ground::{Action, Body, Change, Condition, FactId, FluentId, SnapAction};
 use crate::interference::Footprint;
 use crate::situation::Situation;
 use crate::task::Task;
 
-use present_state::{PresentState, Indeterminate, Moment, RateOf};
+use present_state::{Indeterminate, Moment, PresentState, RateOf};
 
 /// A measured amount that replaces the domain's `amount` in `(increase fluent amount)`, or in another
 /// update.
@@ -492,7 +492,11 @@ impl Execution {
         self.present.on_arrival(duration)
     }
 
-    fn reads(&self, condition: &Condition, duration: Option<&Rational>) -> Result<bool, Indeterminate> {
+    fn reads(
+        &self,
+        condition: &Condition,
+        duration: Option<&Rational>,
+    ) -> Result<bool, Indeterminate> {
         let basic = self.moment(duration);
         let (_, derivation) = &self.derivation;
         if derivation.is_read_by(condition) {
@@ -512,7 +516,8 @@ impl Running {
         for (effect, takes_place) in ends.iter().zip(&mut self.end_guards) {
             let guard = &effect.guard.over_all;
             *takes_place &= guard.is_trivial()
-                || piece.first_falsification(guard, Some(&self.planned), includes_start) == Ok(None);
+                || piece.first_falsification(guard, Some(&self.planned), includes_start)
+                    == Ok(None);
         }
     }
 }

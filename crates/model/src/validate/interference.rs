@@ -1,7 +1,7 @@
 //! The no-moving-targets rule: minimum separation of interfering happenings.
 
-use super::judge::Judge;
 use super::abort::Abort;
+use super::judge::Judge;
 use super::timeline::{Group, Happening, HappeningKind};
 use super::violation::ViolationKind;
 use crate::interference::Footprint;
@@ -13,8 +13,9 @@ pub(super) fn check<'a>(judge: &Judge<'a>, groups: &[Group<'a>]) -> Result<(), A
     let Some((group, earlier)) = groups.split_last() else {
         return Ok(());
     };
-    let touched =
-        |group: &Group<'a>| AccessIndex::from_footprints(group.happenings.iter().map(|own| &own.footprint));
+    let touched = |group: &Group<'a>| {
+        AccessIndex::from_footprints(group.happenings.iter().map(|own| &own.footprint))
+    };
     let own = touched(group);
     for (position, second) in group.happenings.iter().enumerate() {
         let near = own.candidates(&second.footprint).into_iter();
@@ -140,7 +141,10 @@ fn compare<'a>(
     second: &Happening<'a>,
 ) -> Result<(), Abort> {
     // Times of timed initials are no mistake of the plan.
-    let are_both_timed = matches!((first.kind, second.kind), (HappeningKind::Timed(_), HappeningKind::Timed(_)));
+    let are_both_timed = matches!(
+        (first.kind, second.kind),
+        (HappeningKind::Timed(_), HappeningKind::Timed(_))
+    );
     let interfere = first.footprint.interferes_with(&second.footprint);
     if are_both_timed || !interfere || judge.settings.allows_simultaneous_reads {
         return Ok(());

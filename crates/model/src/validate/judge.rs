@@ -5,17 +5,17 @@ use std::collections::BTreeMap;
 
 use elbowroom_num::Rational;
 
+use super::abort::{Abort, EvaluationContext};
 use super::autonomous::EventHistory;
+use super::evaluate::Fault;
 use super::explain::ExplanationContext;
 use super::margin::{Demand, Margins};
-use super::segment::{Falsification, Segment, SegmentPart};
 use super::preferences::{ActionPreferenceMonitor, Part};
-use super::evaluate::Fault;
-use super::state::{Motion, BasicState, Reading};
-use super::abort::{EvaluationContext, Abort};
+use super::segment::{Falsification, Segment, SegmentPart};
+use super::state::{BasicState, Motion, Reading};
 use super::timeline::{Group, HappeningKind};
 use super::trajectory::TrajectoryMonitor;
-use super::violation::{ViolationKind, Reason, ConditionTime};
+use super::violation::{ConditionTime, Reason, ViolationKind};
 use super::{Settings, effects, interference};
 use crate::derivation::{Derivation, Derived, Moment, holds};
 use crate::ground::{Body, Condition, DurativeBody, FactId, SnapAction};
@@ -198,7 +198,12 @@ impl<'a> Judge<'a> {
             let when = (position, duration, state.is_new);
             preferences.watch(&piece, when, (self.task, from));
             for (index, conjunct) in body.over_all.conjuncts().into_iter().enumerate() {
-                let place = EvaluationContext::condition(from, Some(position), ConditionTime::OverAll, conjunct);
+                let place = EvaluationContext::condition(
+                    from,
+                    Some(position),
+                    ConditionTime::OverAll,
+                    conjunct,
+                );
                 let broken = piece
                     .first_falsification(conjunct, duration, !state.is_new)
                     .map_err(|fault| self.to_abort(fault, &place))?;
@@ -217,7 +222,12 @@ impl<'a> Judge<'a> {
             for (effect, flag) in body.end.effects.iter().zip(&mut state.end_guards) {
                 let guard = &effect.guard.over_all;
                 if *flag && !guard.is_trivial() {
-                    let place = EvaluationContext::condition(from, Some(position), ConditionTime::OverAll, guard);
+                    let place = EvaluationContext::condition(
+                        from,
+                        Some(position),
+                        ConditionTime::OverAll,
+                        guard,
+                    );
                     let broken = piece
                         .first_falsification(guard, duration, !state.is_new)
                         .map_err(|fault| self.to_abort(fault, &place))?;
@@ -251,7 +261,12 @@ impl<'a> Judge<'a> {
                 HappeningKind::Start(position) => {
                     let (_, body) = self.durative(position);
                     self.check_duration(position, false, time)?;
-                    self.require(&body.start.condition, ConditionTime::Start, Some(position), group)?;
+                    self.require(
+                        &body.start.condition,
+                        ConditionTime::Start,
+                        Some(position),
+                        group,
+                    )?;
                     self.read_preferences(position, Part::Start, time);
                     let running = self.begin(position, time)?;
                     self.running.insert(position, running);
@@ -259,7 +274,12 @@ impl<'a> Judge<'a> {
                 HappeningKind::End(position) => {
                     let (_, body) = self.durative(position);
                     self.check_duration(position, true, time)?;
-                    self.require(&body.end.condition, ConditionTime::End, Some(position), group)?;
+                    self.require(
+                        &body.end.condition,
+                        ConditionTime::End,
+                        Some(position),
+                        group,
+                    )?;
                     self.read_preferences(position, Part::End, time);
                 }
             }
@@ -278,7 +298,8 @@ impl<'a> Judge<'a> {
     fn begin(&self, position: usize, time: &Rational) -> Result<Running, Abort> {
         let (_, body) = self.durative(position);
         let read = |guard: &Condition| {
-            let place = EvaluationContext::condition(time, Some(position), ConditionTime::Start, guard);
+            let place =
+                EvaluationContext::condition(time, Some(position), ConditionTime::Start, guard);
             self.reads(guard, Some(position))
                 .map_err(|fault| self.to_abort(fault, &place))
         };
@@ -310,7 +331,9 @@ impl<'a> Judge<'a> {
             let value = self
                 .reading(Some(position))
                 .value(&constraint.bound)
-                .map_err(|fault| self.to_abort(fault, &EvaluationContext::bound(time, position, constraint)))?;
+                .map_err(|fault| {
+                    self.to_abort(fault, &EvaluationContext::bound(time, position, constraint))
+                })?;
             if !self
                 .settings
                 .allows(constraint.comparison, &duration, &value)
@@ -412,7 +435,10 @@ impl<'a> Judge<'a> {
             // Rules cannot read `?duration`.
             let derive = || self.derivation.derive(&self.reading_of(now, (None, slack)));
             let derived = derived.get_or_init(derive);
-            look(&reading, &self.derivation.with_derived_facts(&reading, derived))
+            look(
+                &reading,
+                &self.derivation.with_derived_facts(&reading, derived),
+            )
         } else {
             look(&reading, &reading)
         }

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use elbowroom_num::Rational;
 
-use super::segment::Segment;
 use super::polynomial::Polynomial;
+use super::segment::Segment;
 use super::state::Reading;
 use super::violation::{ActionInstance, ConditionTime};
 use crate::ground::{Condition, Expression};

@@ -2,10 +2,10 @@
 
 use elbowroom_num::Rational;
 
+use super::evaluate::Fault;
 use super::judge::Judge;
 use super::segment::Segment;
-use super::evaluate::Fault;
-use super::violation::{ActionInstance, UndecidedReason, Undecided};
+use super::violation::{ActionInstance, Undecided, UndecidedReason};
 use crate::grounder::SoftCondition;
 use crate::plan::TimeTriggeredPlan;
 use crate::problem::PreferenceId;

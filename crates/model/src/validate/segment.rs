@@ -7,11 +7,11 @@
 
 use elbowroom_num::Rational;
 
-use super::sign_cells::{ZeroSet, Position, cells, product};
+use super::evaluate::{Fault, compare_signs, evaluate};
 use super::instant::Instant;
 use super::polynomial::{Polynomial, Root};
-use super::evaluate::{Fault, compare_signs, evaluate};
-use super::state::{Motion, BasicState};
+use super::sign_cells::{Position, ZeroSet, cells, product};
+use super::state::{BasicState, Motion};
 use crate::derivation::{Derivation, Moment, holds};
 use crate::ground::{Condition, Expression, FactId};
 use crate::problem::Comparison;
@@ -173,13 +173,17 @@ impl Segment<'_> {
         let reads_derived = self.derivation.is_read_by(condition);
         if !self.is_time_dependent(condition, reads_derived) {
             let view = self.view(None, Position::Point(Rational::ZERO));
-            return Ok((self.evaluate_condition(condition, &view, reads_derived)?, None));
+            return Ok((
+                self.evaluate_condition(condition, &view, reads_derived)?,
+                None,
+            ));
         }
         let cuts = self.zeros(condition, None, reads_derived);
         let polynomial = product(&cuts.polynomials);
         let mut first = None;
         for cell in cells(&cuts, self.length, self.part, false) {
-            let holds = self.evaluate_condition(condition, &self.view(None, cell.place), reads_derived)?;
+            let holds =
+                self.evaluate_condition(condition, &self.view(None, cell.place), reads_derived)?;
             let first = *first.get_or_insert(holds);
             if holds != first {
                 let at = Instant::of(cell.from, &polynomial);
@@ -235,12 +239,20 @@ impl Segment<'_> {
         }
     }
 
-    fn evaluate_condition(&self, condition: &Condition, view: &View<'_>, derive: bool) -> Result<bool, Fault> {
+    fn evaluate_condition(
+        &self,
+        condition: &Condition,
+        view: &View<'_>,
+        derive: bool,
+    ) -> Result<bool, Fault> {
         if derive {
             // Rules cannot read `?duration`.
             let plain = self.view(None, view.place.clone());
             let derived = self.derivation.derive(&plain);
-            holds(condition, &self.derivation.with_derived_facts(view, &derived))
+            holds(
+                condition,
+                &self.derivation.with_derived_facts(view, &derived),
+            )
         } else {
             holds(condition, view)
         }

@@ -3,8 +3,8 @@
 use elbowroom_num::Rational;
 
 use super::instant::Instant;
-use super::segment::SegmentPart;
 use super::polynomial::{Polynomial, Root};
+use super::segment::SegmentPart;
 
 /// Zeros of some polynomials within a piece.
 pub(super) struct ZeroSet {

@@ -4,9 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use elbowroom_num::Rational;
 
+use super::evaluate::{Fault, compare_signs, evaluate};
 use super::instant::Instant;
 use super::polynomial::Polynomial;
-use super::evaluate::{Fault, compare_signs, evaluate};
 use crate::derivation::Moment;
 use crate::ground::{Expression, FactId, FluentId};
 use crate::problem::Comparison;
@@ -175,7 +175,11 @@ impl Motion {
     }
 
     /// Returns the sum of some rates of one fluent, and the last of their steps.
-    fn total_rate(&self, now: &BasicState, rates: &[&Rate<'_>]) -> Result<(Polynomial, Option<usize>), StepFault> {
+    fn total_rate(
+        &self,
+        now: &BasicState,
+        rates: &[&Rate<'_>],
+    ) -> Result<(Polynomial, Option<usize>), StepFault> {
         let mut speed = Polynomial::constant(Rational::ZERO);
         let mut step = None;
         for rate in rates {
@@ -188,7 +192,12 @@ impl Motion {
     }
 
     /// Sets a fluent to the value of a polynomial on the clock of the motion.
-    pub(super) fn set_value(&mut self, now: &mut BasicState, fluent: FluentId, polynomial: Polynomial) {
+    pub(super) fn set_value(
+        &mut self,
+        now: &mut BasicState,
+        fluent: FluentId,
+        polynomial: Polynomial,
+    ) {
         if let Some(value) = polynomial.as_constant() {
             self.0.remove(&fluent);
             now.set(fluent, Some(value));
@@ -222,7 +231,9 @@ impl Motion {
 }
 
 /// Returns the rates by fluent, sorted so that those that others read come first.
-fn in_order<'r, 'a>(rates: &'r [Rate<'a>]) -> Result<Vec<(FluentId, Vec<&'r Rate<'a>>)>, StepFault> {
+fn in_order<'r, 'a>(
+    rates: &'r [Rate<'a>],
+) -> Result<Vec<(FluentId, Vec<&'r Rate<'a>>)>, StepFault> {
     let mut terms: BTreeMap<FluentId, Vec<&Rate<'_>>> = BTreeMap::new();
     for rate in rates {
         terms.entry(rate.fluent).or_default().push(rate);

@@ -8,12 +8,12 @@
 
 use elbowroom_num::Rational;
 
+use super::abort::{Abort, EvaluationContext};
+use super::constraint_monitor::{ConstraintMonitor, Finding, PhaseStart};
+use super::evaluate::Fault;
 use super::judge::Judge;
 use super::segment::Segment;
-use super::evaluate::Fault;
-use super::abort::{EvaluationContext, Abort};
-use super::constraint_monitor::{PhaseStart, Finding, ConstraintMonitor};
-use super::violation::{UndecidedReason, ViolationKind, Undecided, ConditionTime};
+use super::violation::{ConditionTime, Undecided, UndecidedReason, ViolationKind};
 use crate::constraint::{Constraints, Modal};
 use crate::ground::Condition;
 
@@ -89,7 +89,8 @@ impl<'a> TrajectoryMonitor<'a> {
     ) -> Result<(), Abort> {
         self.visit(|modal, track, is_hard| {
             let conditions = modal.conditions();
-            let place = EvaluationContext::condition(from, None, ConditionTime::Trajectory, conditions[0]);
+            let place =
+                EvaluationContext::condition(from, None, ConditionTime::Trajectory, conditions[0]);
             let cells = match piece.course(&conditions) {
                 Ok(cells) => cells,
                 Err(fault @ (Fault::Undefined(_) | Fault::DivisionByZero(_))) if !is_hard => {
@@ -148,9 +149,10 @@ impl<'a> TrajectoryMonitor<'a> {
         }
         match (first, unclear) {
             (Some((at, mistake)), _) => Err(judge.violation(&at.time, None, mistake)),
-            (None, Some((time, constraint))) => {
-                Err(undecided(Some(time), UndecidedReason::CloseTimes { constraint }))
-            }
+            (None, Some((time, constraint))) => Err(undecided(
+                Some(time),
+                UndecidedReason::CloseTimes { constraint },
+            )),
             (None, None) => Ok(()),
         }
     }
@@ -195,7 +197,10 @@ impl<'a> TrajectoryMonitor<'a> {
 }
 
 fn undecided(time: Option<Rational>, difficulty: UndecidedReason) -> Abort {
-    Abort::Undecided(Box::new(Undecided { time, reason: difficulty }))
+    Abort::Undecided(Box::new(Undecided {
+        time,
+        reason: difficulty,
+    }))
 }
 
 /// Returns the truth value. An undefined soft condition does not hold.

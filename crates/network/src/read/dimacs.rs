@@ -8,8 +8,8 @@ use std::collections::BTreeSet;
 
 use crate::builder::Builder;
 use crate::file::{Format, NetworkFile};
-use crate::report::Report;
 use crate::number::Bound;
+use crate::report::Report;
 
 /// Limit on nodes: more than any such file has.
 const MOST_NODES: usize = 1 << 20;

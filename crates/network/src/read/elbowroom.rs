@@ -4,12 +4,12 @@
 use elbowroom_num::Rational;
 use elbowroom_stn::NodeId;
 
-use super::{bound, optional_bound, list, number, required};
+use super::{bound, list, number, optional_bound, required};
 use crate::builder::{Builder, GivenLink};
 use crate::file::{Correlation, Duration, Format, GivenWait, NetworkFile};
 use crate::json::{Json, Value};
-use crate::report::Report;
 use crate::number::Bound;
+use crate::report::Report;
 
 /// The value of the member `format`.
 pub(crate) const FORMAT: &str = "elbowroom-network";

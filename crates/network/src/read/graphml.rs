@@ -15,8 +15,8 @@ use elbowroom_stn::NodeId;
 use super::REFUSED_HELP;
 use crate::builder::{Builder, GivenLink};
 use crate::file::{Format, GivenWait, NetworkFile};
-use crate::report::Report;
 use crate::number::Bound;
+use crate::report::Report;
 use crate::xml::{self, Element};
 
 /// Name of the node that serves as time zero.

@@ -7,12 +7,12 @@
 
 use elbowroom_stn::NodeId;
 
-use super::{optional_bound, distribution, list, point_name, required};
+use super::{distribution, list, optional_bound, point_name, required};
 use crate::builder::{Builder, GivenLink};
 use crate::file::{Duration, Format, NetworkFile};
 use crate::json::Json;
-use crate::report::Report;
 use crate::number::Bound;
+use crate::report::Report;
 
 /// Name of the node that serves as time zero.
 const REFERENCE: &str = "0";

@@ -9,8 +9,8 @@ use super::{bound, point_name};
 use crate::builder::Builder;
 use crate::file::{Format, NetworkFile};
 use crate::json::Json;
-use crate::report::Report;
 use crate::number::Bound;
+use crate::report::Report;
 
 /// Returns `true` if a document has this form: an object that maps node numbers to lists.
 pub(super) fn are_in(document: &Json<'_>) -> bool {

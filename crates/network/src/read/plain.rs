@@ -22,8 +22,8 @@
 
 use crate::builder::{Builder, GivenLink};
 use crate::file::{Format, NetworkFile};
-use crate::report::Report;
 use crate::number::Bound;
+use crate::report::Report;
 
 /// The section that a line belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -14,8 +14,8 @@ use super::{bound, list, number, point_name, required};
 use crate::builder::{Builder, GivenLink};
 use crate::file::{Correlation, Duration, Format, NetworkFile};
 use crate::json::Json;
-use crate::report::Report;
 use crate::number::Bound;
+use crate::report::Report;
 
 /// The number that the library writes for infinity.
 const INFINITY: i64 = 1_000_000_000;

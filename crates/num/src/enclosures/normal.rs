@@ -36,7 +36,8 @@ const TAIL_CUTOFF: i64 = 9;
 /// Upper bound on the tail of the normal distribution, or on a power, that is not computed.
 const TAIL_BOUND: (i64, usize) = (1, 62);
 /// `1 / √(2π)`; all these digits are correct.
-const INV_SQRT_2PI: &str = "0.3989422804014326779399460599343818684758586311649346576659258296706579258993";
+const INV_SQRT_2PI: &str =
+    "0.3989422804014326779399460599343818684758586311649346576659258296706579258993";
 
 /// Returns bounds on `e^-argument` that are some 10^-19 apart; the argument must not be negative.
 ///

@@ -159,7 +159,8 @@ impl Density {
             return within;
         }
         let [least, most] = upper.map_or([Rational::ONE, Rational::ONE], |at| self.cdf_bounds(at));
-        let [under, over] = lower.map_or([Rational::ZERO, Rational::ZERO], |at| self.cdf_bounds(at));
+        let [under, over] =
+            lower.map_or([Rational::ZERO, Rational::ZERO], |at| self.cdf_bounds(at));
         [(least - over).max(Rational::ZERO), most - under]
     }
 
@@ -194,7 +195,8 @@ impl Density {
             }
             Self::Exponential { from, mean } => {
                 let times = (at - from).checked_div(mean).unwrap_or_default();
-                enclosures::exp_of_minus(&times).map(|own| own.checked_div(mean).unwrap_or_default())
+                enclosures::exp_of_minus(&times)
+                    .map(|own| own.checked_div(mean).unwrap_or_default())
             }
             Self::Lognormal { spread, .. } => {
                 let Some(ends) = self.standardized(at) else {

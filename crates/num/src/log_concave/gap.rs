@@ -1,6 +1,6 @@
 //! Upper bounds on the difference of the logarithm of a probability and a linear function.
 
-use super::{Cell, LogConcaveDistribution, Dense, Reach, TangentPoint};
+use super::{Cell, Dense, LogConcaveDistribution, Reach, TangentPoint};
 use crate::{Rational, enclosures};
 
 /// Position of a cut relative to the intervals of a cell.

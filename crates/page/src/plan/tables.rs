@@ -1,9 +1,9 @@
 //! Tables of a plan.
 
 use elbowroom::answers::envelope::timeline::{TimedAction, Timeline, WindowAnswer};
-use elbowroom::answers::envelope::{Quantity, Range, LimitedRange};
+use elbowroom::answers::envelope::{LimitedRange, Quantity, Range};
 use elbowroom::num::{End, Rational};
-use elbowroom::report::decimal::{Rounding, rounded_inwards, nearest};
+use elbowroom::report::decimal::{Rounding, nearest, rounded_inwards};
 
 use super::window_words;
 use crate::document::{Table, Text, Texts};

@@ -86,7 +86,9 @@ impl IntervalWithOthersFixed {
 }
 
 /// Converts the interval for a slider.
-pub(super) fn reach<'a>((alone, quantity): (&'a IntervalWithOthersFixed, &'a Quantity)) -> SliderInterval<'a> {
+pub(super) fn reach<'a>(
+    (alone, quantity): (&'a IntervalWithOthersFixed, &'a Quantity),
+) -> SliderInterval<'a> {
     SliderInterval {
         quantity,
         lower: alone.lower.as_ref().map(|(end, _)| end),

@@ -1,7 +1,7 @@
 //! Guarantee over the time of a run, with the reasons for its changes.
 
-use elbowroom::report::schema::{DecisionLine, ObservationLine, WindowLine};
 use elbowroom::report::decimal::nearest;
+use elbowroom::report::schema::{DecisionLine, ObservationLine, WindowLine};
 use elbowroom::report::trace::Line;
 
 use super::bars::Bars;

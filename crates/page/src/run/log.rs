@@ -1,8 +1,8 @@
 //! Log of a trace: each line as text.
 
 use elbowroom::num::Rational;
-use elbowroom::report::schema::{DecisionLine, IssuedCommandLine, ObservationLine, WindowLine};
 use elbowroom::report::decimal::nearest;
+use elbowroom::report::schema::{DecisionLine, IssuedCommandLine, ObservationLine, WindowLine};
 use elbowroom::report::trace::Line;
 
 use super::bars::{Bars, answer};
@@ -56,7 +56,13 @@ impl Log {
             Line::Observed(observed) => {
                 let (time, what) = observation(&observed.observation, bars);
                 let remark = observed.remark.clone().unwrap_or_default();
-                self.add(time, "observation", what, due_text(&observed.planned), remark);
+                self.add(
+                    time,
+                    "observation",
+                    what,
+                    due_text(&observed.planned),
+                    remark,
+                );
             }
             Line::Planning(planning) => {
                 let why = planning.reason.words.clone();

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use elbowroom::execution::{BeliefState, ActionHandle};
+use elbowroom::execution::{ActionHandle, BeliefState};
 use elbowroom::model::expression::Comparison;
 use elbowroom::model::ground::{Action, Body, Condition, Expression, FluentId};
 use elbowroom::num::Rational;
@@ -65,7 +65,12 @@ impl NumericLimits {
         let name = action.name.clone();
         let body = match &action.body {
             Body::Instantaneous(snap) => {
-                return self.add_momentary_limits(&format!("at {name}"), &snap.condition, None, state);
+                return self.add_momentary_limits(
+                    &format!("at {name}"),
+                    &snap.condition,
+                    None,
+                    state,
+                );
             }
             Body::Durative(body) => body,
         };
@@ -337,7 +342,10 @@ mod tests {
         assert_eq!(room(least(1, 2)), (number(4), number(2)));
         let most = allowed(0, 9, Comparison::AtMost, 20);
         assert_eq!(room(most), (number(8), number(3)));
-        assert_eq!(allowed(0, 9, Comparison::Equal, 1).smallest_distance(&points), None);
+        assert_eq!(
+            allowed(0, 9, Comparison::Equal, 1).smallest_distance(&points),
+            None
+        );
         let words = describe_closest_point(&[least(3, 6), least(0, 3)], &points).expect("limits");
         assert_eq!(
             words,

@@ -204,7 +204,13 @@ impl Reader {
     ) -> Effects {
         let mut effects = Effects::default();
         if let Some((_, Some(node))) = fields.get(":effect") {
-            self.effect(node, moment, scope, &mut EffectContext::default(), &mut effects);
+            self.effect(
+                node,
+                moment,
+                scope,
+                &mut EffectContext::default(),
+                &mut effects,
+            );
         }
         effects
     }

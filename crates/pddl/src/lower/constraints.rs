@@ -279,7 +279,11 @@ impl Reader {
     }
 
     /// Adds the preferences found in the goal, as constraints on the end of the plan.
-    pub(super) fn goal_preferences(&mut self, found: Vec<FoundPreference>, span: crate::source::Span) {
+    pub(super) fn goal_preferences(
+        &mut self,
+        found: Vec<FoundPreference>,
+        span: crate::source::Span,
+    ) {
         for soft in found {
             let at_end = Constraint::Modal(Modal::AtEnd(soft.condition.start));
             let mut constraint = Constraint::Preference(soft.preference, Box::new(at_end));

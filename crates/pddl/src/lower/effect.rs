@@ -294,7 +294,11 @@ impl Reader {
         scope: &Scope,
         node: &Node,
     ) -> Option<Guard> {
-        let size: usize = around.conditions.iter().map(|w| w.span.end - w.span.start).sum();
+        let size: usize = around
+            .conditions
+            .iter()
+            .map(|w| w.span.end - w.span.start)
+            .sum();
         self.copied += size + 50 * around.variables.len();
         if self.copied > MAX_COPIED {
             self.copied = 0;

@@ -170,7 +170,13 @@ impl Reader {
     }
 
     /// Reads `or`, `not`, `imply` over parts that are all read at the same time.
-    fn read_at_single_time(&mut self, head: &str, node: &Node, parts: &[Node], scope: &mut Scope) -> Timed {
+    fn read_at_single_time(
+        &mut self,
+        head: &str,
+        node: &Node,
+        parts: &[Node],
+        scope: &mut Scope,
+    ) -> Timed {
         let parts: Vec<Timed> = without_preferences(scope, |scope| {
             parts
                 .iter()

@@ -8,9 +8,9 @@ use std::ops::Range;
 
 use elbowroom_text::{Source, Span};
 
+use super::action_like_text::{action_beside_heading, classical, possible_action, single_word};
 use super::form::Form;
 use super::line::{Line, RawStep, line};
-use super::action_like_text::{action_beside_heading, classical, possible_action, single_word};
 use super::vocabulary::Vocabulary;
 
 /// Steps of the last plan in a text, in their order, and the lines that are not read.
@@ -80,7 +80,10 @@ pub(super) fn last_plan<'s>(source: &'s Source, vocabulary: &Vocabulary) -> Last
 fn sections<'s>(source: &'s Source, vocabulary: &Vocabulary) -> Vec<Vec<Entry<'s>>> {
     let text = source.text();
     let mut sections = vec![Vec::new()];
-    for Span { start, end } in source.lines().flat_map(|line| split_at_line_breaks(text, line)) {
+    for Span { start, end } in source
+        .lines()
+        .flat_map(|line| split_at_line_breaks(text, line))
+    {
         let shown = text[start..end].trim_end();
         let indent = shown.len() - shown.trim_start().len();
         let range = start + indent..start + shown.len();

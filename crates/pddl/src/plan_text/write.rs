@@ -86,10 +86,7 @@ pub(super) fn decimal(value: &Rational) -> String {
         text.push('.');
         0
     };
-    text.extend(std::iter::repeat_n(
-        '0',
-        MIN_DIGITS.saturating_sub(digits),
-    ));
+    text.extend(std::iter::repeat_n('0', MIN_DIGITS.saturating_sub(digits)));
     text
 }
 

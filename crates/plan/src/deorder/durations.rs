@@ -59,7 +59,11 @@ pub(crate) fn constraints(task: &Task, plan: &StnPlan, times: &Schedule) -> Vec<
 
 /// Returns a constraint for the duration of each durative instance: the domain's bounds if they
 /// read no changing fluent, else only that it is not negative.
-pub(crate) fn state_independent_bounds(task: &Task, plan: &StnPlan, footprints: &[Footprint]) -> Vec<Constraint> {
+pub(crate) fn state_independent_bounds(
+    task: &Task,
+    plan: &StnPlan,
+    footprints: &[Footprint],
+) -> Vec<Constraint> {
     let mut changing: BTreeSet<FluentId> = BTreeSet::new();
     for footprint in footprints {
         changing.extend(footprint.shifts.iter().chain(&footprint.assigns));

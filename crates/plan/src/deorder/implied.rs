@@ -25,7 +25,8 @@ pub fn without_implied(mut plan: StnPlan, times: &Schedule) -> StnPlan {
         implied_in(plan.nodes.len(), drafts, times)
     } else {
         let in_delta = |number: &Rational| Some(Delta::from(number.clone()));
-        let (drafts, times) = convert_numbers(&drafts, times, &in_delta).expect("each number is one");
+        let (drafts, times) =
+            convert_numbers(&drafts, times, &in_delta).expect("each number is one");
         implied_in(plan.nodes.len(), drafts, times)
     };
     let Some(is_implied) = implied else {
@@ -125,10 +126,15 @@ fn implied_in<W: Weight>(
 
 /// Multiplies all bounds and times by their common denominator. Returns `None` if a sum of the
 /// results might overflow.
-fn scale_to_integers(drafts: &[Draft<Rational>], times: &Schedule) -> Option<(Vec<Draft<i128>>, Vec<i128>)> {
+fn scale_to_integers(
+    drafts: &[Draft<Rational>],
+    times: &Schedule,
+) -> Option<(Vec<Draft<i128>>, Vec<i128>)> {
     let bounds = drafts.iter().map(|draft| &draft.constraint.bound);
     let unit = CommonDenominator::of(bounds.chain(times.iter()))?;
-    convert_numbers(drafts, times, &|number| unit.to_integer(number).map(i128::from))
+    convert_numbers(drafts, times, &|number| {
+        unit.to_integer(number).map(i128::from)
+    })
 }
 
 /// Converts all bounds and times to another number type, if it can represent them.

@@ -169,7 +169,12 @@ impl<'a> Changes<'a> {
 
     /// Returns `true` if a condition that must hold between those two nodes does so in every
     /// schedule.
-    fn preserves_condition(&self, task: &Task, conjunct: &Condition, (start, end): (NodeId, NodeId)) -> bool {
+    fn preserves_condition(
+        &self,
+        task: &Task,
+        conjunct: &Condition,
+        (start, end): (NodeId, NodeId),
+    ) -> bool {
         let literal = match conjunct {
             Condition::Not(part) => part,
             other => other,

@@ -22,7 +22,13 @@ pub(super) struct Order {
 
 impl Order {
     /// Adds the constraint that `to` comes at least `distance` after `from`.
-    pub(super) fn require_distance(&mut self, from: NodeId, to: NodeId, distance: Rational, reason: Reason) {
+    pub(super) fn require_distance(
+        &mut self,
+        from: NodeId,
+        to: NodeId,
+        distance: Rational,
+        reason: Reason,
+    ) {
         if from == to {
             return;
         }
@@ -135,7 +141,11 @@ impl<'a> Timeline<'a> {
         let writers: Vec<_> = uses.copied().filter(|(_, what)| what.writes()).collect();
         let chunks = writers.chunk_by(|(_, a), (_, b)| a.commutes_with(*b));
         let in_run = |(run, uses): (usize, &'_ [(NodeId, Use)])| {
-            let writer = |&(node, what): &(NodeId, Use)| Writer { node, run, access: what };
+            let writer = |&(node, what): &(NodeId, Use)| Writer {
+                node,
+                run,
+                access: what,
+            };
             uses.iter().map(writer).collect::<Vec<_>>()
         };
         chunks.enumerate().flat_map(in_run).collect()

@@ -116,7 +116,12 @@ fn effects(plan: &StnPlan, node: NodeId) -> &[Effect] {
 }
 
 /// Keeps turns in their order, and simultaneous ones together.
-fn constrain_order(task: &Task, groups: &[Vec<NodeId>], times: &Schedule, found: &mut Vec<Constraint>) {
+fn constrain_order(
+    task: &Task,
+    groups: &[Vec<NodeId>],
+    times: &Schedule,
+    found: &mut Vec<Constraint>,
+) {
     for group in groups {
         for pair in group.windows(2) {
             found.push(between(

@@ -9,8 +9,8 @@ use elbowroom_model::ground::FluentId;
 use elbowroom_model::problem::{Comparison, FunctionId};
 use elbowroom_num::{End, Interval, Rational};
 
-use super::constants::{self, Place};
 use super::builder::{ParametrizationBuilder, Quantity};
+use super::constants::{self, Place};
 use super::{ConstantTarget, ParametrizeError, VarySpec, nothing_matches, select};
 use crate::parameter::ParameterKind;
 use crate::stn_plan::{Bound, Constraint, Instance, InstanceId, NodeId, Reason};
@@ -36,9 +36,13 @@ impl ParametrizationBuilder<'_> {
             }
             let (start, end) = (plan.start(id), plan.end(id));
             if let Some(&known) = known.get(&id) {
-                self.parameter_of_quantity.entry(Quantity::Duration(id)).or_insert(known);
+                self.parameter_of_quantity
+                    .entry(Quantity::Duration(id))
+                    .or_insert(known);
             }
-            let is_new = !self.parameter_of_quantity.contains_key(&Quantity::Duration(id));
+            let is_new = !self
+                .parameter_of_quantity
+                .contains_key(&Quantity::Duration(id));
             let number = instance.label.strip_prefix('n').unwrap_or(&instance.label);
             let name = format!("dur_{number}");
             let nominal = &self.nominal[end] - &self.nominal[start];
@@ -145,7 +149,9 @@ impl ParametrizationBuilder<'_> {
                     let read = constants::fluents(self.task, &instance.action, place);
                     // A read of the function itself does not determine the amount of its change.
                     let mut others = read.into_iter();
-                    if let Some(other) = others.find(|fluent| self.is_other_function(*fluent, target)) {
+                    if let Some(other) =
+                        others.find(|fluent| self.is_other_function(*fluent, target))
+                    {
                         let name = self.task.fluent_name(other);
                         why = format!("{why}; {name} says how much: `initial {name}`");
                     }
@@ -179,7 +185,8 @@ impl ParametrizationBuilder<'_> {
             };
             shared = Some(value.clone());
             let parameter = self.parameter(spec, quantity, name, kind, value.clone())?;
-            let opened = constants::with_parameter(self.task, &instance.action, place, &value, parameter);
+            let opened =
+                constants::with_parameter(self.task, &instance.action, place, &value, parameter);
             self.plan.plan.instances[id.index()].action = Arc::new(opened);
         }
         Ok(())
@@ -240,7 +247,9 @@ impl ParametrizationBuilder<'_> {
         let groups = select::timed(self.task, spec, atom, only_deletions)?;
         let word = if only_deletions { "deadline" } else { "timed" };
         for group in groups {
-            let is_new = !self.parameter_of_quantity.contains_key(&Quantity::Timed(group));
+            let is_new = !self
+                .parameter_of_quantity
+                .contains_key(&Quantity::Timed(group));
             let name = format!("{word}_{}", joined(atom));
             let time = self.task.timed()[group].time.clone();
             let kind = ParameterKind::Timed(group);

@@ -72,7 +72,10 @@ pub(super) fn instances(
 
 fn some(spec: &VarySpec, found: Vec<InstanceId>) -> Result<Vec<InstanceId>, ParametrizeError> {
     if found.is_empty() {
-        return Err(nothing_matches(spec, "the plan has no such action".to_owned()));
+        return Err(nothing_matches(
+            spec,
+            "the plan has no such action".to_owned(),
+        ));
     }
     Ok(found)
 }

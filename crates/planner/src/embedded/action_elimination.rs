@@ -252,10 +252,16 @@ mod tests {
         // It had been there before, but is sold in the meantime.
         let plan = "0: (sell book)\n1: (fetch r book) [5]";
         let init = "(have book) (= (charge r) 1) (= (charge s) 0)";
-        assert_eq!(remaining_steps(init, "(and (sold book) (have book))", plan).len(), 2);
+        assert_eq!(
+            remaining_steps(init, "(and (sold book) (have book))", plan).len(),
+            2
+        );
         // The goal reads the number.
         let plan = "0: (load r) [2]";
         let init = "(= (charge r) 0) (= (charge s) 0)";
-        assert_eq!(remaining_steps(init, "(>= (charge r) 2)", plan), ["(load r)"]);
+        assert_eq!(
+            remaining_steps(init, "(>= (charge r) 2)", plan),
+            ["(load r)"]
+        );
     }
 }

@@ -18,7 +18,7 @@ use super::symbolic;
 use super::time::{NEVER, Ticks};
 use conditions::Side;
 use durations::demand_duration;
-use placement::{project_past, insert, keep_within, place_known_end, place_timed, settle};
+use placement::{insert, keep_within, place_known_end, place_timed, project_past, settle};
 
 /// A choice of the search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -8,7 +8,6 @@
 //! PDDL's no-moving-targets rule and by over-all conditions is computed once, and the search only
 //! takes maxima.
 
-mod initial_state;
 mod builder;
 mod calendars;
 mod completeness;
@@ -17,14 +16,15 @@ mod compression;
 mod directions;
 mod exclusive;
 mod fixed_durations;
+mod full_form;
 mod guarded;
+mod initial_state;
 mod interference;
 mod macros;
 mod metric;
 mod own_start;
 mod reads;
 mod rules;
-mod full_form;
 mod symbols;
 mod times;
 mod unfolded;
@@ -38,9 +38,9 @@ use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_model::problem::{Comparison, ObjectId, SchemaId, UpdateOperator};
 use elbowroom_num::Rational;
 
-pub(crate) use initial_state::InitialState;
-pub(crate) use builder::{Failure, CompileInput, compile};
+pub(crate) use builder::{CompileInput, Failure, compile};
 pub(crate) use calendars::{Calendar, Dates, spans};
+pub(crate) use initial_state::InitialState;
 pub(crate) use macros::Macro;
 pub(crate) use metric::Metric;
 pub use unsupported::Unsupported;

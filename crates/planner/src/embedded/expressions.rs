@@ -94,7 +94,9 @@ impl Form {
 
 impl Symbolic {
     pub(crate) fn linear_function(&self, fluent: u32) -> Option<&LinearFunction> {
-        let place = self.functions.binary_search_by_key(&fluent, |entry| entry.0);
+        let place = self
+            .functions
+            .binary_search_by_key(&fluent, |entry| entry.0);
         place.ok().map(|place| &self.functions[place].1)
     }
 

@@ -214,7 +214,8 @@ impl<'a> Refiner<'a> {
     pub(crate) fn share(&self) -> u64 {
         let tuning = &self.compiled.tuning;
         let spent = self.work.rescheduling.saturating_add(self.work.repair);
-        if spent >= tuning.refining_share_after && self.turns_since_best < tuning.refining_patience {
+        if spent >= tuning.refining_share_after && self.turns_since_best < tuning.refining_patience
+        {
             tuning.refining_share
         } else {
             tuning.refining_share_later
@@ -446,7 +447,12 @@ fn sequence_state_at(
 
 /// Returns the latest time at which a plan with this beginning may end if it must be better than
 /// `worth`, or equally good.
-fn latest_end(compiled: &Compiled, worth: &PlanCost, may_equal: bool, state: &State) -> Option<Ticks> {
+fn latest_end(
+    compiled: &Compiled,
+    worth: &PlanCost,
+    may_equal: bool,
+    state: &State,
+) -> Option<Ticks> {
     let Some(metric) = &compiled.metric else {
         return Some(worth.end - i64::from(!may_equal));
     };

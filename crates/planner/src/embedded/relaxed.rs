@@ -9,13 +9,13 @@
 
 mod changes;
 mod consumables;
+mod cost_propagation;
 mod deadlines;
 mod graph;
 mod labels;
 mod numbers;
 mod plan;
 mod resources;
-mod cost_propagation;
 #[cfg(test)]
 mod tests;
 
@@ -25,10 +25,10 @@ use elbowroom_num::Rational;
 
 use super::apply::Step;
 use super::compile::{Compiled, Compressibility};
+use super::end_windows::EndWindows;
 use super::formula::Literal;
 use super::network::SETTLED;
 use super::root::root;
-use super::end_windows::EndWindows;
 use super::state::{OpenAction, State};
 use super::step_costs::StepCosts;
 use super::symbolic;
@@ -335,8 +335,9 @@ impl<'a> Relaxed<'a> {
                 self.missing[operator as usize] += 1;
             }
         }
-        let outlasts =
-            |open: &OpenAction| open.most < NEVER && (open.node == SETTLED || self.is_chronological);
+        let outlasts = |open: &OpenAction| {
+            open.most < NEVER && (open.node == SETTLED || self.is_chronological)
+        };
         if self.horizon < NEVER || !self.graph.windows.is_empty() || state.open.iter().any(outlasts)
         {
             is_in_time = self.deadlines.exclude_late_operators(
@@ -437,7 +438,10 @@ pub(crate) fn last_end(spans: &[(Ticks, Ticks)]) -> Option<Ticks> {
 /// Returns the highest levels of exclusive fluents whose values depend on times. No other action
 /// reads them before the ends of the running ones.
 fn highest_levels(compiled: &Compiled, state: &State) -> Vec<(u32, Rational)> {
-    let courses = state.symbolic.iter().flat_map(|symbolic| &symbolic.functions);
+    let courses = state
+        .symbolic
+        .iter()
+        .flat_map(|symbolic| &symbolic.functions);
     let exclusive = courses.filter(|(fluent, _)| compiled.exclusive_fluents[*fluent as usize]);
     let levels = exclusive.filter_map(|(fluent, _)| {
         let level = symbolic::highest_level(compiled, state, *fluent)?;

@@ -13,7 +13,8 @@ pub(crate) fn root(compiled: &Compiled) -> State {
     state.cost.clone_from(&beginning.cost);
     state.network = Network::with_windows(compiled.windows.clone());
     for (number, running) in (0..).zip(&beginning.running) {
-        let mut open = OpenAction::running_initially(number, running.start, running.least, running.most);
+        let mut open =
+            OpenAction::running_initially(number, running.start, running.least, running.most);
         open.duration.clone_from(&running.duration);
         if let Some(latest) = compiled.latest_end_in_window(number) {
             open.most = open.most.min(latest - running.start);

@@ -2,10 +2,10 @@
 
 mod cleanup;
 mod improve;
-mod portfolio;
-mod refining;
 mod memory_limit;
 mod parallel;
+mod portfolio;
+mod refining;
 mod worker;
 
 use std::ops::ControlFlow;
@@ -15,19 +15,19 @@ use elbowroom_model::Task;
 
 use super::answer::{Answer, Counts, Progress, Proof, Stopped};
 use super::compile::Compiled;
-use super::mutex_pairs::MutexPairs;
 use super::deadline_explanation::{self, Names};
+use super::mutex_pairs::MutexPairs;
 use super::relaxed;
 use super::root::root;
 use super::search::Search;
 use super::symmetry::Symmetry;
 use super::tuning::Technique;
 use improve::SearchSlot;
-use refining::LocalSearch;
 use memory_limit::memory_of;
 use parallel::{Job, ReportCallback, run_parallel};
+use refining::LocalSearch;
 pub(super) use worker::Frame;
-use worker::{SearchBudget, Best, Outcome, Report, Worker};
+use worker::{Best, Outcome, Report, SearchBudget, Worker};
 
 pub(super) fn none_found(stopped: Stopped, counts: Counts) -> Answer {
     Answer::NoneFound {
@@ -111,7 +111,8 @@ impl<'a> Planner<'a> {
         let strategies = self.strategies();
         // The others are created at their first turn, since their creation is slow with many
         // actions.
-        let mut entrants: Vec<SearchSlot<'_>> = strategies.into_iter().map(SearchSlot::new).collect();
+        let mut entrants: Vec<SearchSlot<'_>> =
+            strategies.into_iter().map(SearchSlot::new).collect();
         let (turn, budget) = match self.first_plan(&mut entrants) {
             FirstPlanResult::Proved(proof) => {
                 let counts = self.progress.counts;
@@ -175,7 +176,10 @@ impl<'a> Planner<'a> {
     fn first_plan(&mut self, entrants: &mut [SearchSlot<'a>]) -> FirstPlanResult {
         let compiled = self.frame.compiled;
         let tuning = &compiled.tuning;
-        self.run_first_search(&mut entrants[0], SearchBudget::turns(tuning.root_check_after));
+        self.run_first_search(
+            &mut entrants[0],
+            SearchBudget::turns(tuning.root_check_after),
+        );
         if self.best.is_none()
             && tuning.uses(Technique::DeadEnds)
             && self
@@ -284,7 +288,11 @@ impl<'a> Planner<'a> {
 
     /// Runs the first search alone until a first plan. Returns its outcome, and the number of turns
     /// that it counts for.
-    fn run_first_search(&mut self, entrant: &mut SearchSlot<'a>, allowance: SearchBudget) -> (Outcome, u64) {
+    fn run_first_search(
+        &mut self,
+        entrant: &mut SearchSlot<'a>,
+        allowance: SearchBudget,
+    ) -> (Outcome, u64) {
         let (frame, symmetry, unreported) = (self.frame, self.symmetry, self.unreported);
         let search = entrant.search(frame, symmetry);
         let mut base = self.progress.counts;

@@ -8,10 +8,10 @@
 //! A search for plans with a better metric weighs the cost so far against the remaining cost of the
 //! relaxed plan, and prunes states that cannot become better than the best plan (branch and bound).
 
+mod closed_list;
 mod dead_ends;
 mod difference;
 mod goals;
-mod closed_list;
 mod landmarks;
 mod node;
 mod novelty;
@@ -19,8 +19,8 @@ mod open_list;
 mod runaway;
 mod states;
 mod strategy;
-mod successors;
 mod successor_list;
+mod successors;
 
 use super::answer::Counts;
 use super::apply::{Step, Stepper};
@@ -34,10 +34,10 @@ use super::step_costs::StepCosts;
 use super::symmetry::Symmetry;
 use super::time::{NEVER, Ticks};
 use super::tuning::Technique;
+use closed_list::Hashes;
 use dead_ends::DeadEnds;
 pub(crate) use goals::is_goal;
 use goals::misses_goal;
-use closed_list::Hashes;
 use landmarks::SearchLandmarks;
 use node::{DeadEnd, NONE, Node, Notes, SharedNotes};
 use novelty::Novelty;
@@ -418,7 +418,12 @@ impl<'a> Search<'a> {
         let drift = self.drift(parent, &state, estimate.steps);
         let may_be_better = is_goal && self.may_be_better(&state);
         let notes = Notes { projection, drift };
-        let number = self.add(QueuedSuccessor::step(parent, step), (accepted, left), state, notes);
+        let number = self.add(
+            QueuedSuccessor::step(parent, step),
+            (accepted, left),
+            state,
+            notes,
+        );
         self.closed_list.push(hash);
         // A goal state may still have useful successors: the validator can reject the plan, and
         // another plan can be better.
@@ -431,7 +436,13 @@ impl<'a> Search<'a> {
 
     /// Adds a node, and returns its number. `left` are the accepted landmarks, and the number of
     /// remaining ones.
-    fn add(&mut self, origin: QueuedSuccessor, left: (Vec<u64>, u32), state: State, notes: Notes) -> u32 {
+    fn add(
+        &mut self,
+        origin: QueuedSuccessor,
+        left: (Vec<u64>, u32),
+        state: State,
+        notes: Notes,
+    ) -> u32 {
         let number = u32::try_from(self.nodes.len()).expect("memory is used up long before");
         let (accepted, left) = left;
         let (accepted, memory) = if accepted.is_empty() {

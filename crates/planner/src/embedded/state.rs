@@ -110,7 +110,12 @@ pub(crate) struct OpenAction {
 
 impl OpenAction {
     /// Returns an action that was running before the search began.
-    pub(crate) fn running_initially(action: u32, start: Ticks, least: Ticks, most: Option<Ticks>) -> Self {
+    pub(crate) fn running_initially(
+        action: u32,
+        start: Ticks,
+        least: Ticks,
+        most: Option<Ticks>,
+    ) -> Self {
         Self {
             action,
             node: SETTLED,
@@ -159,7 +164,8 @@ impl State {
 
     /// Returns `true` if an instance of the action is running that it must not overlap.
     pub(crate) fn excludes(&self, compiled: &Compiled, action: &Action) -> bool {
-        let is_same = |open: &OpenAction| compiled.action(open.action).exclusion == action.exclusion;
+        let is_same =
+            |open: &OpenAction| compiled.action(open.action).exclusion == action.exclusion;
         action.exclusion != NONE && self.open.iter().any(is_same)
     }
 
@@ -175,9 +181,9 @@ impl State {
                     if super::formula::is_set(&self.facts, rule.head) {
                         continue;
                     }
-                    let holds = rule
-                        .body
-                        .holds(&self.facts, &mut |test| self.test_holds(compiled, test, None));
+                    let holds = rule.body.holds(&self.facts, &mut |test| {
+                        self.test_holds(compiled, test, None)
+                    });
                     if holds {
                         set(&mut self.facts, rule.head, true);
                         changed = true;

@@ -14,7 +14,7 @@ use elbowroom_model::problem::{Comparison, UpdateOperator};
 use elbowroom_num::Rational;
 
 use super::compile::{Change, Compiled, Update};
-use super::expressions::{LinearFunction, Form, Moment, Symbolic};
+use super::expressions::{Form, LinearFunction, Moment, Symbolic};
 use super::formula::{Formula, Linear, Numeric};
 use super::network::{NodeId, SETTLED};
 use super::state::{OpenAction, State};

@@ -125,10 +125,11 @@ impl Exchange {
                     state.annotations[a as usize] == state.annotations[b as usize]
                         && (a == b || !is_marked(a) && !is_marked(b))
                 }))
-            && state
-                .symbolic
-                .as_ref()
-                .is_none_or(|symbolic| self.fluents.iter().all(|&(a, _)| !symbolic.is_time_dependent(a)))
+            && state.symbolic.as_ref().is_none_or(|symbolic| {
+                self.fluents
+                    .iter()
+                    .all(|&(a, _)| !symbolic.is_time_dependent(a))
+            })
     }
 }
 

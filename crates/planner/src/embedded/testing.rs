@@ -4,7 +4,7 @@ use elbowroom_model::reachability::{self, Answer};
 use elbowroom_model::{Situation, Task};
 
 use super::apply::Step;
-use super::compile::{Compiled, CompileInput, compile};
+use super::compile::{CompileInput, Compiled, compile};
 use super::state::State;
 use super::tuning::Tuning;
 

@@ -125,7 +125,8 @@ pub(super) fn plan(
         for soft in 0..task.constraints().soft.len() {
             demanded.push(soft);
             let before = search.best.as_ref().map(|best| best.value.clone());
-            let tried = search.search_with_preferences((&demanded, Coverage::All), Some(TRIAL), true);
+            let tried =
+                search.search_with_preferences((&demanded, Coverage::All), Some(TRIAL), true);
             let after = search.best.as_ref().map(|best| best.value.clone());
             if tried.is_err() || after == before {
                 demanded.pop();
@@ -143,7 +144,8 @@ pub(super) fn plan(
     {
         return answer;
     }
-    match search.search_with_preferences((&demanded, Coverage::All), None, settings.first_plan_only) {
+    match search.search_with_preferences((&demanded, Coverage::All), None, settings.first_plan_only)
+    {
         Ok(answer) => {
             let proof = search.search_unconstrained(None);
             proof.unwrap_or_else(|| search.answer(answer))
@@ -244,7 +246,11 @@ impl Search<'_> {
         let answer = match whole {
             Ok(answer) => answer,
             Err(answer) if matches!(*answer, Answer::Unsupported(_)) => {
-                let part = self.search_with_preferences((demanded, Coverage::Expressible), Some(QUICK), true);
+                let part = self.search_with_preferences(
+                    (demanded, Coverage::Expressible),
+                    Some(QUICK),
+                    true,
+                );
                 part.unwrap_or(*answer)
             }
             Err(answer) => return Some(*answer),

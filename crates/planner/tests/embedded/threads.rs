@@ -9,8 +9,8 @@ use elbowroom_planner::{Answer, Progress, Settings, plan};
 use proptest::prelude::*;
 
 use crate::portfolio::shelf;
-use crate::refinement::{made_up, shop};
 use crate::reference::drafts::{METRICS, drafts, thrifty_drafts};
+use crate::refinement::{made_up, shop};
 use crate::world::{describe, task};
 
 /// Returns settings with which strands start concurrently at once, and exchange their plans after

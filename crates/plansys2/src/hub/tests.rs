@@ -198,7 +198,10 @@ fn a_repeated_finish_counts_once() {
     scene.says(kind::RESPONSE, "robot1", "move r a b");
     scene.says(kind::FINISH, "robot1", "move r a b");
     scene.says_more(kind::FINISH, "robot1", "move r a b", false, "");
-    assert_eq!(scene.outcomes(1), [&ActionUpdate::Started, &ActionUpdate::Succeeded]);
+    assert_eq!(
+        scene.outcomes(1),
+        [&ActionUpdate::Started, &ActionUpdate::Succeeded]
+    );
 }
 
 #[test]
@@ -273,7 +276,10 @@ fn cancelled_action_is_not_reassigned_before_confirmation() {
     let why = "robot1 has not confirmed that it has stopped the same action";
     assert_eq!(scene.outcomes(2), [&failed(why)]);
     scene.is_in(state::READY, "robot1");
-    assert_eq!(scene.outcomes(1), [&ActionUpdate::Started, &ActionUpdate::Cancelled]);
+    assert_eq!(
+        scene.outcomes(1),
+        [&ActionUpdate::Started, &ActionUpdate::Cancelled]
+    );
     scene.begin(3, "move r a b");
     scene.says(kind::RESPONSE, "robot1", "move r a b");
     assert_eq!(scene.last_sent(), (kind::CONFIRM, "robot1"));
@@ -297,7 +303,10 @@ fn a_success_after_a_cancel_counts() {
     scene.says(kind::RESPONSE, "robot1", "move r a b");
     scene.hub.cancel(1);
     scene.says(kind::FINISH, "robot1", "move r a b");
-    assert_eq!(scene.outcomes(1), [&ActionUpdate::Started, &ActionUpdate::Succeeded]);
+    assert_eq!(
+        scene.outcomes(1),
+        [&ActionUpdate::Started, &ActionUpdate::Succeeded]
+    );
 }
 
 #[test]
@@ -312,7 +321,10 @@ fn the_same_action_is_not_done_twice_at_a_time_but_others_are() {
     assert_eq!(scene.outcomes(3), [&failed(why)]);
     scene.says(kind::FINISH, "robot2", "move r2 a b");
     assert_eq!(scene.outcomes(1), [&ActionUpdate::Started]);
-    assert_eq!(scene.outcomes(2), [&ActionUpdate::Started, &ActionUpdate::Succeeded]);
+    assert_eq!(
+        scene.outcomes(2),
+        [&ActionUpdate::Started, &ActionUpdate::Succeeded]
+    );
 }
 
 #[test]
@@ -322,7 +334,10 @@ fn an_action_without_arguments_may_come_as_its_own_argument() {
         scene.begin(ticket, "beep");
         scene.says(kind::RESPONSE, "robot1", text);
         scene.says(kind::FINISH, "robot1", text);
-        assert_eq!(scene.outcomes(ticket), [&ActionUpdate::Started, &ActionUpdate::Succeeded]);
+        assert_eq!(
+            scene.outcomes(ticket),
+            [&ActionUpdate::Started, &ActionUpdate::Succeeded]
+        );
     }
 }
 

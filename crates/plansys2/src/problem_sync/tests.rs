@@ -390,7 +390,8 @@ impl Simulation {
 
     fn believe(&mut self, it: &str, truth: bool) {
         if self.facts.insert(it.to_owned(), truth) != Some(truth) {
-            self.mirror.set_beliefs(&[fact(&format!("({it})"), truth)], &[]);
+            self.mirror
+                .set_beliefs(&[fact(&format!("({it})"), truth)], &[]);
         }
     }
 
@@ -454,7 +455,9 @@ impl Simulation {
         let seen = self.mirror.seen();
         for it in &seen {
             match it {
-                ExternalChange::Fact(it, truth) => self.believe(it.trim_matches(['(', ')']), *truth),
+                ExternalChange::Fact(it, truth) => {
+                    self.believe(it.trim_matches(['(', ')']), *truth)
+                }
                 ExternalChange::Value(_, value) => self.count(*value),
             }
         }

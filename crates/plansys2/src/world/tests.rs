@@ -8,7 +8,10 @@ fn greeted(speed: f64) -> World {
     let mut world = World::new("plansys2", speed);
     let mut said = vec![];
     let hello = r#"{"type":"hello","protocol":"elbowroom-world","version":1,"versions":[1,2]}"#;
-    assert_eq!(world.handle_line(hello, at(0.0), &mut said).expect("JSON"), None);
+    assert_eq!(
+        world.handle_line(hello, at(0.0), &mut said).expect("JSON"),
+        None
+    );
     assert_eq!(
         said,
         [r#"{"type":"hello","version":2,"name":"plansys2","can":["cancel","feedback"]}"#]
@@ -157,8 +160,14 @@ fn beliefs_are_received_and_external_changes_reported() {
     );
     hears(&mut world, WAIT, 1.0);
     assert!(world.answer(at(1.5)).is_empty());
-    world.report_change(&ExternalChange::Fact("(blocked b)".to_owned(), true), at(1.5));
-    world.report_change(&ExternalChange::Value("(charge r)".to_owned(), 2.0), at(1.5));
+    world.report_change(
+        &ExternalChange::Fact("(blocked b)".to_owned(), true),
+        at(1.5),
+    );
+    world.report_change(
+        &ExternalChange::Value("(charge r)".to_owned(), 2.0),
+        at(1.5),
+    );
     assert_eq!(
         world.answer(at(1.5)),
         [

@@ -3,8 +3,8 @@
 use elbowroom_plan::Node;
 
 use super::layer_requirements::LayerRequirements;
-use crate::search_state::SearchState;
 use crate::search::{FirstWindow, OrderSearch, Suffixes};
+use crate::search_state::SearchState;
 use crate::total_order::{Slot, TotalOrderPlan};
 
 /// Layers of an order that fit, and time windows of its suffixes. Gives the same result as

@@ -91,7 +91,11 @@ impl Likelihoods {
             .chain([&self.defaults.failing])
     }
 
-    fn failing<T: Copy>(&self, action: &Action, part: impl Fn(&FailureModel) -> Option<T>) -> Option<T> {
+    fn failing<T: Copy>(
+        &self,
+        action: &Action,
+        part: impl Fn(&FailureModel) -> Option<T>,
+    ) -> Option<T> {
         // An instantaneous action has no end.
         action.durative()?;
         self.failing_of(action.schema, &action.arguments)

@@ -93,7 +93,12 @@ fn action(text: &mut String, problem: &Problem, schema: SchemaId, success: &Succ
     }
 }
 
-fn failures(text: &mut String, problem: &Problem, schema: Option<SchemaId>, failing: &FailureModel) {
+fn failures(
+    text: &mut String,
+    problem: &Problem,
+    schema: Option<SchemaId>,
+    failing: &FailureModel,
+) {
     let entries = [
         ("end", failing.end),
         ("during_per_second", failing.during_per_second),

@@ -13,8 +13,8 @@ use elbowroom_num::Rational;
 use elbowroom_plan::{Node, PartialOrderPlan};
 
 use super::requirement::{Requirement, is_derived, visit_facts};
-use super::{Event, FactEffect, CompiledOutcome, Model, Semantics, Update};
-use crate::likelihoods::{SpontaneousChange, Likelihoods, Missing, Rate};
+use super::{CompiledOutcome, Event, FactEffect, Model, Semantics, Update};
+use crate::likelihoods::{Likelihoods, Missing, Rate, SpontaneousChange};
 
 pub(super) fn model(
     task: Arc<Task>,
@@ -44,7 +44,9 @@ pub(super) fn model(
     }
     // A derived fact without rules is false, and has no likelihood.
     facts.retain(|fact| !is_derived(&task, *fact));
-    let flips = facts.iter().map(|&fact| likelihoods.spontaneous_change(&task, fact));
+    let flips = facts
+        .iter()
+        .map(|&fact| likelihoods.spontaneous_change(&task, fact));
     let flips = flips.collect::<Result<_, _>>()?;
     let rates = facts.iter().map(|&fact| likelihoods.rate(&task, fact));
     let rates = rates.collect();
@@ -261,7 +263,10 @@ impl Compiler<'_> {
     /// Returns the outcomes of a failed end, without facts that nothing in the model reads or
     /// writes.
     fn failure_outcomes(&self, action: &Action) -> Vec<CompiledOutcome> {
-        let aftermaths = self.likelihoods.failure_outcomes(self.task, action).into_iter();
+        let aftermaths = self
+            .likelihoods
+            .failure_outcomes(self.task, action)
+            .into_iter();
         let leftover = |aftermath: crate::likelihoods::FailureOutcome| {
             // The last of several changes of a fact counts.
             let mut changes = BTreeMap::new();

@@ -73,7 +73,11 @@ impl PrunedNetwork<'_> {
     }
 
     /// Applies the effects of a happening on facts, and spontaneous changes.
-    pub(super) fn apply_fact_effects(&mut self, node: NodeId, event: &Event) -> Result<(), TooCoupled> {
+    pub(super) fn apply_fact_effects(
+        &mut self,
+        node: NodeId,
+        event: &Event,
+    ) -> Result<(), TooCoupled> {
         let model = self.model;
         let mut uncertain = Vec::new();
         let mut certain = Vec::new();

@@ -11,7 +11,7 @@ mod snapshot;
 use elbowroom_model::ground::{Condition, Expression, FactId};
 
 use super::cluster::{Cluster, Kernel};
-use super::outcome::{Outcome, Pending, spontaneous_kernel, kernel, rate_kernel};
+use super::outcome::{Outcome, Pending, kernel, rate_kernel, spontaneous_kernel};
 use crate::belief::Belief;
 use crate::likelihoods::Rate;
 use crate::model::{Model, Value, evaluate, visit_facts};
@@ -214,7 +214,8 @@ impl Facts {
             for (place, &fact) in cluster.facts.clone().iter().enumerate() {
                 match kernels.iter().find(|(changed, _)| *changed == fact) {
                     Some((_, kernel)) => cluster.transform(place, *kernel),
-                    None if is_step => cluster.transform(place, spontaneous_kernel(model.spontaneous_changes[fact])),
+                    None if is_step => cluster
+                        .transform(place, spontaneous_kernel(model.spontaneous_changes[fact])),
                     None => {}
                 }
             }

@@ -1,7 +1,7 @@
 //! Influence of effects, and of spontaneous changes, on the probability of a fact.
 
 use super::cluster::Kernel;
-use crate::likelihoods::{SpontaneousChange, Rate};
+use crate::likelihoods::{Rate, SpontaneousChange};
 use crate::model::{FactEffect, Model, Semantics};
 
 /// An effect with its success probability.

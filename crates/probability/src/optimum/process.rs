@@ -5,9 +5,9 @@ use std::sync::Arc;
 use elbowroom_plan::{InstanceId, Node, NodeId};
 
 use super::table::{check, holds, table};
-use super::{DeadEnds, Move, TabulationError, Settings};
-use crate::search_state::SearchState;
+use super::{DeadEnds, Move, Settings, TabulationError};
 use crate::model::{Event, Model, Requirement};
+use crate::search_state::SearchState;
 
 /// Largest number of states to tabulate.
 const MAX_STATES: usize = 1 << 22;

@@ -9,13 +9,13 @@ use elbowroom_model::{Step, Task};
 use elbowroom_num::Rational;
 use elbowroom_plan::{Instance, PartialOrderPlan};
 
-use super::{TabulationError, Optimum, Perturbed, Settings};
+use super::{Optimum, Perturbed, Settings, TabulationError};
 use crate::actions::all_actions_under;
-use crate::search_state::SearchState;
 use crate::dispatch::Choice;
 use crate::likelihoods::Likelihoods;
 use crate::model::{Model, Semantics};
 use crate::search::{OrderSearch, SearchSettings};
+use crate::search_state::SearchState;
 use crate::total_order::Slot;
 
 /// Largest number of actions that run at once.

@@ -24,7 +24,11 @@ pub(super) fn check(model: &Model) -> Result<(), TabulationError> {
     if !model.task().timed().is_empty() {
         return Err(unsupported("facts change at fixed times"));
     }
-    if model.events.iter().any(|event| !event.guard_memories.is_empty()) {
+    if model
+        .events
+        .iter()
+        .any(|event| !event.guard_memories.is_empty())
+    {
         return Err(unsupported(
             "effects depend on what held throughout an action",
         ));

@@ -113,7 +113,9 @@ impl Perturbed {
                 return sweeps;
             }
             let was_settled = is_settled.clone();
-            let landings: Vec<_> = (0..values.len()).map(|i| self.values_at_step_end(values, i)).collect();
+            let landings: Vec<_> = (0..values.len())
+                .map(|i| self.values_at_step_end(values, i))
+                .collect();
             for (layer, landing) in landings.iter().enumerate() {
                 if was_settled[layer] && layer.checked_sub(1).is_none_or(|i| was_settled[i]) {
                     continue;

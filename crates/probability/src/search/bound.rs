@@ -300,7 +300,10 @@ impl Run<'_, '_, '_> {
             running,
             ends: ends.len(),
         };
-        let shares: Vec<Vec<f64>> = ends.iter().map(|&id| self.factors_by_rank(id, queue)).collect();
+        let shares: Vec<Vec<f64>> = ends
+            .iter()
+            .map(|&id| self.factors_by_rank(id, queue))
+            .collect();
         self.bound *= assignment::best_product(&shares);
         for &id in needed.iter().skip(running) {
             for &(fact, truth) in &self.bounds.needs_at_start[id.index()] {
@@ -364,7 +367,12 @@ impl Run<'_, '_, '_> {
     ///
     /// An over-all condition must never fail after the start. The best start is just before the
     /// end: until then, a lost fact may be restored by a spontaneous change.
-    fn persistence_bound(&mut self, id: InstanceId, (fact, truth): (usize, bool), before: usize) -> f64 {
+    fn persistence_bound(
+        &mut self,
+        id: InstanceId,
+        (fact, truth): (usize, bool),
+        before: usize,
+    ) -> f64 {
         let literal = (fact, truth);
         let bounds = self.bounds;
         let is_throughout = bounds.needs_throughout[id.index()].contains(&literal);

@@ -7,8 +7,8 @@ use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, NodeId};
 use indexmap::IndexMap;
 
-use crate::search_state::SearchState;
 use crate::model::Model;
+use crate::search_state::SearchState;
 use crate::total_order::TotalOrderPlan;
 
 /// Largest number of entries; then the cache is cleared.

@@ -13,8 +13,8 @@ use elbowroom_plan::{Node, NodeId};
 use super::nominal::Nominal;
 use super::time_slack::TimeSlacks;
 use super::{Candidates, OrderSearch, SEQUENCE_WORK};
-use crate::search_state::SearchState;
 use crate::network::{PrunedNetwork, TooCoupled};
+use crate::search_state::SearchState;
 
 /// Orders of a plan.
 #[derive(Clone, Debug, PartialEq)]
@@ -240,7 +240,11 @@ impl LatticeBuilder<'_> {
             } else {
                 !self.must_work || self.nominal.apply(model, event, running)
             };
-            if works && self.time_slacks.push(model, (node, is_joined), timed_before) {
+            if works
+                && self
+                    .time_slacks
+                    .push(model, (node, is_joined), timed_before)
+            {
                 self.mark(node, what, true);
                 best = self.explore()?;
                 self.mark(node, what, false);

@@ -16,8 +16,8 @@ use elbowroom_plan::{InstanceId, Node};
 use indexmap::IndexMap;
 
 use super::nominal::{Nominal, Truth};
-use super::time_slack::TimeSlack;
 use super::separations::Separations;
+use super::time_slack::TimeSlack;
 use crate::model::{Model, Requirement, visit_facts};
 use crate::network::{Number, PrunedNetwork, Snapshot};
 

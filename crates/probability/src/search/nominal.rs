@@ -5,8 +5,8 @@ use elbowroom_model::ground::{Condition, Expression, FactId};
 use elbowroom_model::problem::Comparison;
 use elbowroom_plan::InstanceId;
 
-use crate::search_state::SearchState;
 use crate::model::{Event, Model, Requirement, is_fact};
+use crate::search_state::SearchState;
 
 /// Truth value of a fact without failures. Numbers are not tracked here, so an effect whose
 /// condition reads them may or may not take place.

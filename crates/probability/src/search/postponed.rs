@@ -4,9 +4,9 @@ use elbowroom_plan::{InstanceId, Node, NodeId};
 
 use super::OrderSearch;
 use super::run::TIE_TOLERANCE;
-use crate::search_state::SearchState;
 use crate::model::Event;
 use crate::network::{Happenings, PrunedNetwork, TooCoupled};
+use crate::search_state::SearchState;
 
 impl OrderSearch {
     /// Moves starts behind ends that may fail and on whose effects the end of the started action
@@ -95,7 +95,11 @@ impl OrderSearch {
         let (start, end) = (self.model.start(other), self.model.end(other));
         let (start, end) = (self.model.event(start), self.model.event(end));
         let needed = [&start.condition, &start.over_all, &end.condition];
-        let aftermaths = self.model.event(self.model.end(own)).failure_outcomes.iter();
+        let aftermaths = self
+            .model
+            .event(self.model.end(own))
+            .failure_outcomes
+            .iter();
         let mut changes = aftermaths.flat_map(|aftermath| &aftermath.changes);
         changes.any(|&(fact, becomes)| {
             let mut needed = needed.iter();

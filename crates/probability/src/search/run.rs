@@ -10,9 +10,9 @@ use super::memo::Memo;
 use super::nominal::Nominal;
 use super::time_slack::TimeSlacks;
 use super::{Candidates, OrderSearch, Progress, SEQUENCE_WORK};
-use crate::search_state::SearchState;
 use crate::model::Model;
 use crate::network::{PrunedNetwork, TooCoupled};
+use crate::search_state::SearchState;
 
 /// A running search, with the data of the current sequence.
 pub(super) struct Run<'s, 'w> {
@@ -115,7 +115,10 @@ impl<'s, 'w> Run<'s, 'w> {
                 break;
             }
             let timed_before = self.timed_before(node);
-            if !self.time_slacks.push(self.model, (node, is_joined), timed_before) {
+            if !self
+                .time_slacks
+                .push(self.model, (node, is_joined), timed_before)
+            {
                 self.pop(node);
                 break;
             }
@@ -161,7 +164,9 @@ impl<'s, 'w> Run<'s, 'w> {
                 continue;
             }
             let timed_before = self.timed_before(node);
-            let has_time = self.time_slacks.push(self.model, (node, is_joined), timed_before);
+            let has_time = self
+                .time_slacks
+                .push(self.model, (node, is_joined), timed_before);
             let deeper = if has_time {
                 let deeper = if !is_open && self.is_dominated() {
                     ControlFlow::Continue(())
@@ -194,7 +199,8 @@ impl<'s, 'w> Run<'s, 'w> {
             Some(best) => {
                 let (best, order) = (best.probability, &best.sequence);
                 bound.probability > best * (1.0 + TIE_TOLERANCE)
-                    || (bound.probability >= best * (1.0 - TIE_TOLERANCE) && bound.length < order.len())
+                    || (bound.probability >= best * (1.0 - TIE_TOLERANCE)
+                        && bound.length < order.len())
             }
         }
     }
@@ -358,7 +364,9 @@ impl<'s, 'w> Run<'s, 'w> {
     /// Returns `true` if an equivalent sequence dominates the current one.
     fn is_dominated(&mut self) -> bool {
         let has_timed = self.next_timed < self.search.separations.timed.len();
-        let room = self.time_slacks.relevant_slack(self.has_deadlines && has_timed);
+        let room = self
+            .time_slacks
+            .relevant_slack(self.has_deadlines && has_timed);
         self.memo.is_dominated(
             self.model,
             &self.nominal,

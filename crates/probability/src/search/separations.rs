@@ -5,8 +5,8 @@ use elbowroom_model::ground::Body;
 use elbowroom_num::Rational;
 use elbowroom_plan::{LinkKind, Node, NodeId};
 
-use crate::search_state::Running;
 use crate::model::Model;
+use crate::search_state::Running;
 
 /// Temporal constraints of a plan, computed once for all searches.
 #[derive(Clone, Debug)]

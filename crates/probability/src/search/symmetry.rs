@@ -12,9 +12,9 @@
 use elbowroom_plan::{InstanceId, NodeId};
 
 use super::separations::Separations;
-use crate::search_state::SearchState;
 use crate::likelihoods::Rate;
 use crate::model::{Event, Model};
+use crate::search_state::SearchState;
 
 /// Symmetries of a model, computed once for all searches.
 #[derive(Clone, Debug)]

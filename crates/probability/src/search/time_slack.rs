@@ -13,8 +13,8 @@ use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node, NodeId};
 
 use super::separations::Separations;
-use crate::search_state::SearchState;
 use crate::model::Model;
+use crate::search_state::SearchState;
 
 pub(crate) use suffixes::{FirstWindow, Suffixes};
 
@@ -121,7 +121,9 @@ impl<'s> TimeSlacks<'s> {
         }
         for place in 0..room.points.len() {
             match room.points[place] {
-                Point::Recent(other) if place != own && separations.must_be_separated(other, node) => {
+                Point::Recent(other)
+                    if place != own && separations.must_be_separated(other, node) =>
+                {
                     room.at_least(place, own, &separations.epsilon)?;
                 }
                 Point::End(_) if place != own => room.at_least(own, place, &Rational::ZERO)?,

@@ -5,8 +5,8 @@ use elbowroom_plan::{InstanceId, Node, NodeId};
 use elbowroom_stn::{ConsistentNetwork, Constraint};
 
 use super::separations::Separations;
-use crate::search_state::SearchState;
 use crate::model::Model;
+use crate::search_state::SearchState;
 
 /// The whole network of an order, happening by happening.
 ///

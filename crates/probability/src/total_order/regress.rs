@@ -189,7 +189,11 @@ struct Undetermined;
 
 /// Returns a fluent's value after a happening as an expression over values before; `None` if it
 /// does not change.
-fn value_after(model: &Model, event: &Event, fluent: FluentId) -> Result<Option<Expression>, Undetermined> {
+fn value_after(
+    model: &Model,
+    event: &Event,
+    fluent: FluentId,
+) -> Result<Option<Expression>, Undetermined> {
     let Some(position) = model.fluent_position(fluent) else {
         return Ok(None);
     };

@@ -15,7 +15,7 @@ use elbowroom_model::problem::UpdateOperator;
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node, NodeId, PartialOrderPlan};
 use elbowroom_probability::likelihoods::FailureModel;
-use elbowroom_probability::{SearchState, SpontaneousChange, Likelihoods, Semantics};
+use elbowroom_probability::{Likelihoods, SearchState, Semantics, SpontaneousChange};
 
 /// A world: the true facts, and the end effects of running actions that will take place.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -312,7 +312,10 @@ impl<'a> Worlds<'a> {
                 }
                 let set = left.iter().rev().find(|(own, _)| *own == fact);
                 let was = set.map_or(world.facts[index], |(_, truth)| *truth);
-                let flip = self.likelihoods.spontaneous_change(self.task, fact).unwrap();
+                let flip = self
+                    .likelihoods
+                    .spontaneous_change(self.task, fact)
+                    .unwrap();
                 let p = f64::from(u8::from(was));
                 // A set fact has an effect: in the paper's network it does not also change by
                 // itself.
@@ -436,7 +439,10 @@ impl<'a> Worlds<'a> {
                 }
             }
             let was = f64::from(u8::from(world.facts[index]));
-            let flip = self.likelihoods.spontaneous_change(self.task, fact).unwrap();
+            let flip = self
+                .likelihoods
+                .spontaneous_change(self.task, fact)
+                .unwrap();
             let p = self.chance(was, &adds, &deletes, flip);
             outcomes = outcomes
                 .into_iter()

@@ -8,8 +8,10 @@ use elbowroom_model::ground::{Action, Change, FactId, SnapAction};
 use elbowroom_model::problem::{PredicateId, SchemaId};
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node, NodeId, PartialOrderPlan};
-use elbowroom_probability::likelihoods::{FailureModel, Outcome, OutcomeChange, PartialChange, Success};
-use elbowroom_probability::{SearchState, Likelihoods, Running};
+use elbowroom_probability::likelihoods::{
+    FailureModel, Outcome, OutcomeChange, PartialChange, Success,
+};
+use elbowroom_probability::{Likelihoods, Running, SearchState};
 use rand::Rng;
 use rand::seq::IndexedRandom;
 

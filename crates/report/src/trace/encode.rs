@@ -2,8 +2,8 @@
 
 use elbowroom_execution::run::{ExecutedStep, Report, Verdict};
 use elbowroom_execution::{
-    Command, Decision, Ending, Entry, Event, GoalChange, Measured, PreparedPlan, Observation, Order,
-    Planned, Reason, Request, ActionHandle, WarningCause,
+    ActionHandle, Command, Decision, Ending, Entry, Event, GoalChange, Measured, Observation,
+    Order, Planned, PreparedPlan, Reason, Request, WarningCause,
 };
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::{Interval, Rational};
@@ -11,11 +11,12 @@ use elbowroom_plan::{Bound, ParametrizedPlan};
 use indexmap::IndexMap;
 
 use super::schema::{
-    BoundLine, CommandLine, ConstraintLine, DecidedLine, DecisionLine, ExecutedLine, IssuedCommandLine,
-    GoalChangeLine, GoalState, InstanceLine, InterruptedLine, IntervalLine, KeptPlanLine, Line,
-    GoalLookLine, NetworkLine, ObservationLine, ObservedLine, OrderLine, ParameterLine, TimeAdvanceLine,
-    PlanLine, PlannedLine, PlanningLine, ReasonLine, ReportLine, IdleLine, RunningLine,
-    ShortfallLine, SituationLine, StepLine, TermsLine, WarningLine, WindowLine, WorldFailedLine,
+    BoundLine, CommandLine, ConstraintLine, DecidedLine, DecisionLine, ExecutedLine,
+    GoalChangeLine, GoalLookLine, GoalState, IdleLine, InstanceLine, InterruptedLine, IntervalLine,
+    IssuedCommandLine, KeptPlanLine, Line, NetworkLine, ObservationLine, ObservedLine, OrderLine,
+    ParameterLine, PlanLine, PlannedLine, PlanningLine, ReasonLine, ReportLine, RunningLine,
+    ShortfallLine, SituationLine, StepLine, TermsLine, TimeAdvanceLine, WarningLine, WindowLine,
+    WorldFailedLine,
 };
 use crate::exact::Exact;
 

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use elbowroom_execution::{
-    Command, Entry, PlanForm, Observation, TimeAdvance, PlanAnswer, Planner, PlannerAnswer, PrepareError,
-    PreparationResult, Preparer, Recorder, PreparationRequest, World, WorldError,
+    Command, Entry, Observation, PlanAnswer, PlanForm, Planner, PlannerAnswer, PreparationRequest,
+    PreparationResult, PrepareError, Preparer, Recorder, TimeAdvance, World, WorldError,
 };
 use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan};
@@ -15,7 +15,7 @@ use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
 use super::schema::{
-    Line, GoalLookLine, ObservationLine, TimeAdvanceLine, PlannedLine, ShortfallLine, StepLine,
+    GoalLookLine, Line, ObservationLine, PlannedLine, ShortfallLine, StepLine, TimeAdvanceLine,
 };
 use super::{FORMAT, SNAPSHOT, SnapshotLine, VERSION};
 use crate::wire::read_observation;
@@ -222,7 +222,8 @@ impl ReplayWorld {
                     now, observations, ..
                 })
                 | Line::Looked(GoalLookLine { now, observations }) => {
-                    let passage = RecordedAnswer::Passage(number, now.0.clone(), observations.clone());
+                    let passage =
+                        RecordedAnswer::Passage(number, now.0.clone(), observations.clone());
                     answers.push_back(passage);
                     continue;
                 }

@@ -1,13 +1,13 @@
 //! Snapshot of a run at the rotation of its record, as a line.
 
-mod starts;
 mod plan_adoption;
+mod starts;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use elbowroom_execution::run::{RunPhase, Goals, RefusalBackoff, RunSnapshot};
-use elbowroom_execution::{Doubt, BeliefStateParts, BeliefState, ActionHandle};
+use elbowroom_execution::run::{Goals, RefusalBackoff, RunPhase, RunSnapshot};
+use elbowroom_execution::{ActionHandle, BeliefState, BeliefStateParts, Doubt};
 use elbowroom_model::Task;
 use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_num::Rational;
@@ -16,10 +16,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::exact::Exact;
 
-pub use starts::{StartLine, RunningActionLine};
 pub use plan_adoption::{
-    ClosedGoalLine, GoalLine, NewsLine, SituationActionLine, PlanAdoptionLine, PendingGoalChangeLine, WaitLine,
+    ClosedGoalLine, GoalLine, NewsLine, PendingGoalChangeLine, PlanAdoptionLine,
+    SituationActionLine, WaitLine,
 };
+pub use starts::{RunningActionLine, StartLine};
 
 /// The second line of a rotated record, which replaces all earlier records. Rotation happens when a
 /// persistent run is idle or adopts a plan: `docs/formats/journal.md`.
@@ -247,7 +248,11 @@ impl SnapshotLine {
             doubtful_facts: doubts(&self.doubtful_facts, |name| fact(task, name))?,
             doubtful_values: doubts(&self.doubtful_numbers, |name| fluent(task, name))?,
             timed: self.timed,
-            running: self.under_way.iter().map(RunningActionLine::parts).collect(),
+            running: self
+                .under_way
+                .iter()
+                .map(RunningActionLine::parts)
+                .collect(),
         };
         let doing = match (&self.plan, &self.since) {
             (Some(plan), _) => RunPhase::Adopting(Box::new(plan.to_plan_adoption(task, &starts)?)),

@@ -67,7 +67,9 @@ impl Template {
             name.push(' ');
             name.push_str(match word {
                 TemplateArgument::Object(object) => object,
-                TemplateArgument::Argument(place) => action.get(*place).copied().unwrap_or_default(),
+                TemplateArgument::Argument(place) => {
+                    action.get(*place).copied().unwrap_or_default()
+                }
             });
         }
         name.push(')');

@@ -10,7 +10,7 @@ use elbowroom_num::Rational;
 use elbowroom_text::{Diagnostic, Severity, Source, Span};
 use toml::Spanned;
 
-use super::{Amount, ExogenousEvent, ExogenousChange, ReportReliability, Rule, WorldModel};
+use super::{Amount, ExogenousChange, ExogenousEvent, ReportReliability, Rule, WorldModel};
 use crate::draw::Distribution;
 use crate::pattern::{ActionPattern, NameKind};
 use section::{File, Section, Shape};
@@ -106,7 +106,10 @@ impl Reader<'_> {
             return Ok(rule);
         }
         Err(self.error_at(
-            &section.get_ref().distribution_span().unwrap_or_else(|| section.span()),
+            &section
+                .get_ref()
+                .distribution_span()
+                .unwrap_or_else(|| section.span()),
             "time is never negative; correct the number, or give a `minimum`",
         ))
     }
@@ -216,7 +219,9 @@ impl Reader<'_> {
     fn distribution(&self, name: &str, shape: &Spanned<Shape>) -> Read<Distribution> {
         let given = shape.get_ref();
         let need = |value: Option<f64>, what: &str| {
-            value.ok_or_else(|| self.error_at(&shape.span(), format!("`{what}` of {name} is missing")))
+            value.ok_or_else(|| {
+                self.error_at(&shape.span(), format!("`{what}` of {name} is missing"))
+            })
         };
         let excess = |wanted: &[&str]| {
             let all = [
@@ -273,7 +278,8 @@ impl Reader<'_> {
         let time = self.rule_of(section, "[[event]]", &own)?;
         let time = self.check_not_negative(section, time)?;
         let becomes = given.becomes.as_ref();
-        let becomes = becomes.ok_or_else(|| self.error_at(&section.span(), "`becomes` is missing"))?;
+        let becomes =
+            becomes.ok_or_else(|| self.error_at(&section.span(), "`becomes` is missing"))?;
         let value = match becomes.get_ref() {
             toml::Value::Boolean(truth) => NewValue::Truth(*truth),
             toml::Value::Integer(value) => NewValue::Value(Some(Rational::from(*value))),
@@ -290,8 +296,8 @@ impl Reader<'_> {
             }
             (None, Some(fluent), NewValue::Value(value)) => {
                 self.pattern(fluent, NameKind::Functions)?;
-                let value =
-                    value.ok_or_else(|| self.error_at(&becomes.span(), "the value must be finite"))?;
+                let value = value
+                    .ok_or_else(|| self.error_at(&becomes.span(), "the value must be finite"))?;
                 ExogenousChange::Value(self.ground(fluent)?, value)
             }
             _ => {
@@ -347,7 +353,10 @@ impl Reader<'_> {
         };
         if given.late.is_none() && given.is_distributed() {
             return Err(self.error_at(
-                &section.get_ref().distribution_span().unwrap_or_else(|| section.span()),
+                &section
+                    .get_ref()
+                    .distribution_span()
+                    .unwrap_or_else(|| section.span()),
                 "`late` is missing: how likely it is that a report comes so late",
             ));
         }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use elbowroom_execution::{Event, ActionHandle};
+use elbowroom_execution::{ActionHandle, Event};
 use elbowroom_model::ground::{Action, Change};
 
 use super::{ComingEvent, SimWorld};

@@ -1,13 +1,13 @@
 //! Worlds that begin in the middle of an execution, conditioned on the observations so far.
 
-use elbowroom_execution::{BeliefState, ObservedChange, ActionHandle, RunningActionState};
+use elbowroom_execution::{ActionHandle, BeliefState, ObservedChange, RunningActionState};
 use elbowroom_model::ground::FactId;
 use elbowroom_num::Rational;
 use rand::Rng;
 
 use super::{ComingEvent, CommandedAction, SimWorld};
 use crate::draw::{Purpose, keyed};
-use crate::model::{ExogenousEvent, ExogenousChange, FailureTime, WorldModel};
+use crate::model::{ExogenousChange, ExogenousEvent, FailureTime, WorldModel};
 
 /// Number of draws for one that is consistent with the observations.
 const MAX_DRAWS: u64 = 64;
@@ -44,7 +44,12 @@ impl<'a> SimWorld<'a> {
     /// depend only on the seed and on the number of starts of the action since `belief`, so
     /// different executors that continue from here meet the same world, as long as they do the
     /// same.
-    pub fn mid_execution(belief: &BeliefState, model: &'a WorldModel, seed: u64, past: &ObservedChanges) -> Self {
+    pub fn mid_execution(
+        belief: &BeliefState,
+        model: &'a WorldModel,
+        seed: u64,
+        past: &ObservedChanges,
+    ) -> Self {
         let now = belief.time().clone();
         let mut world = Self::without_events(belief.clone(), model, seed);
         world.now.clone_from(&now);
@@ -191,7 +196,12 @@ impl<'a> SimWorld<'a> {
     }
 
     /// Draws the time of an event that was not observed; `None` if it does not come any more.
-    fn draw_unobserved_event(&self, index: usize, event: &ExogenousEvent, past: &ObservedChanges) -> Option<Rational> {
+    fn draw_unobserved_event(
+        &self,
+        index: usize,
+        event: &ExogenousEvent,
+        past: &ObservedChanges,
+    ) -> Option<Rational> {
         for draw in 0..MAX_DRAWS {
             let time = self.draw_event_time(index, event, draw)?;
             if time > self.now {

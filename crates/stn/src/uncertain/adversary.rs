@@ -75,7 +75,11 @@ impl Adversary {
     }
 
     /// Returns the time of the next query if nothing happens before.
-    pub fn next_query_time(&self, now: &Rational, happened: &[Option<Rational>]) -> Option<Rational> {
+    pub fn next_query_time(
+        &self,
+        now: &Rational,
+        happened: &[Option<Rational>],
+    ) -> Option<Rational> {
         let links = self.network.links().iter();
         let looks = links.flat_map(|link| {
             let begun = running_since(link, happened);

@@ -205,7 +205,8 @@ impl<W: Weight> Graph<W> {
     /// Returns `true` if a node comes after another in every execution. Always `false` while the
     /// search has found few edges in a large network, because the computation would not pay off.
     pub(super) fn is_after(&mut self, later: NodeId, first: NodeId) -> bool {
-        let is_little = self.given_edges > SMALL_GRAPH && self.edges.len() <= REDUNDANCY_FACTOR * self.given_edges;
+        let is_little = self.given_edges > SMALL_GRAPH
+            && self.edges.len() <= REDUNDANCY_FACTOR * self.given_edges;
         if self.is_full || is_little {
             return false;
         }

@@ -91,7 +91,8 @@ impl<W: Weight> UncertainNetwork<W> {
         };
         let mut on_cycle = |graph: &Graph<W>, closed: ClosedCycle, cycle: &[PathId]| {
             is_refuted = true;
-            if matches!(closed, ClosedCycle::By(_)) && cycle.iter().all(|&way| told.has(graph, way)) {
+            if matches!(closed, ClosedCycle::By(_)) && cycle.iter().all(|&way| told.has(graph, way))
+            {
                 return ControlFlow::Continue(());
             }
             let mut parts = 0;
@@ -103,13 +104,15 @@ impl<W: Weight> UncertainNetwork<W> {
                     cycle,
                     is_flat: false,
                 }),
-                Err(RefutationLimit::Deep) => found.extend(told.flat_path(graph, cycle).map(|steps| {
-                    parts = steps.parts.len();
-                    Refutation {
-                        cycle: vec![steps],
-                        is_flat: true,
-                    }
-                })),
+                Err(RefutationLimit::Deep) => {
+                    found.extend(told.flat_path(graph, cycle).map(|steps| {
+                        parts = steps.parts.len();
+                        Refutation {
+                            cycle: vec![steps],
+                            is_flat: true,
+                        }
+                    }))
+                }
                 Err(RefutationLimit::Long) => {}
             }
             all_parts += parts + cycle.len();
@@ -206,7 +209,11 @@ impl UsedEdges {
     }
 
     /// Returns the steps of a cycle as one way; `None` if there are too many.
-    fn flat_path<W: Weight>(&mut self, graph: &Graph<W>, cycle: &[PathId]) -> Option<RefutationPath> {
+    fn flat_path<W: Weight>(
+        &mut self,
+        graph: &Graph<W>,
+        cycle: &[PathId],
+    ) -> Option<RefutationPath> {
         let mut edges = Vec::new();
         for way in cycle.iter().flat_map(|&way| path_suffixes(graph, way)) {
             let edge = graph.paths[way].edge();

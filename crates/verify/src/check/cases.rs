@@ -57,7 +57,9 @@ impl Checker<'_> {
         let mut all: Vec<Option<Vec<Span>>> = vec![None; cases.len()];
         let mut open = vec![(0, self.spans())];
         while let Some((index, spans)) = open.pop() {
-            let case = cases.get(index).ok_or(Flaw::UnknownReference("case", index))?;
+            let case = cases
+                .get(index)
+                .ok_or(Flaw::UnknownReference("case", index))?;
             if all[index].is_some() {
                 return Err(Flaw::Tree(index));
             }
@@ -82,18 +84,27 @@ impl Checker<'_> {
 
     /// Checks that the cases are exhaustive, and returns the greatest of their bounds. The bound of
     /// a case follows from the sum of its inequalities.
-    pub(super) fn cases(&self, cases: &[Case], follows: &BoundFunction<'_>) -> Result<Rational, Flaw> {
+    pub(super) fn cases(
+        &self,
+        cases: &[Case],
+        follows: &BoundFunction<'_>,
+    ) -> Result<Rational, Flaw> {
         let mut bound: Option<Rational> = None;
         let mut is_seen = vec![false; cases.len()];
         let mut open: Vec<PendingCase> = vec![(0, Vec::new(), self.spans())];
         while let Some((index, chosen, spans)) = open.pop() {
-            let case = cases.get(index).ok_or(Flaw::UnknownReference("case", index))?;
+            let case = cases
+                .get(index)
+                .ok_or(Flaw::UnknownReference("case", index))?;
             if std::mem::replace(&mut is_seen[index], true) {
                 return Err(Flaw::Tree(index));
             }
             match case {
                 Case::Either { proof, cases } => {
-                    let rows = self.rows.get(*proof).ok_or(Flaw::UnknownReference("proof", *proof))?;
+                    let rows = self
+                        .rows
+                        .get(*proof)
+                        .ok_or(Flaw::UnknownReference("proof", *proof))?;
                     if rows.len() != cases.len() {
                         return Err(Flaw::Count {
                             what: "cases",
@@ -162,11 +173,16 @@ impl Checker<'_> {
             }
             match *source {
                 Source::Row(proof, row) => {
-                    let rows = self.rows.get(proof).ok_or(Flaw::UnknownReference("proof", proof))?;
+                    let rows = self
+                        .rows
+                        .get(proof)
+                        .ok_or(Flaw::UnknownReference("proof", proof))?;
                     if rows.len() != 1 && !chosen.contains(&(proof, row)) {
                         return Err(Flaw::InequalityNotInCase(case));
                     }
-                    let row = rows.get(row).ok_or(Flaw::UnknownReference("inequality", row))?;
+                    let row = rows
+                        .get(row)
+                        .ok_or(Flaw::UnknownReference("inequality", row))?;
                     for (sum, own) in factors.iter_mut().zip(&row.factors) {
                         *sum += own * factor;
                     }

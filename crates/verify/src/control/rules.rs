@@ -28,7 +28,9 @@ pub(super) fn check(
     let mut is_seen = vec![false; cases.len()];
     let mut open = vec![(0, intervals.clone())];
     while let Some((index, intervals)) = open.pop() {
-        let case = cases.get(index).ok_or(Flaw::UnknownReference("schedule", index))?;
+        let case = cases
+            .get(index)
+            .ok_or(Flaw::UnknownReference("schedule", index))?;
         if std::mem::replace(&mut is_seen[index], true) {
             return Err(Flaw::Schedules(index));
         }
@@ -72,7 +74,9 @@ fn rule(certificate: &Certificate, intervals: &Intervals, times: &[Affine]) -> R
     for (index, constraint) in certificate.constraints.iter().enumerate() {
         let (from, to) = (&times[constraint.from], &times[constraint.to]);
         for (limit, sign) in [(&constraint.upper, 1), (&constraint.lower, -1)] {
-            let sum = Sum::default().plus_scaled(to, sign).plus_scaled(from, -sign);
+            let sum = Sum::default()
+                .plus_scaled(to, sign)
+                .plus_scaled(from, -sign);
             let Some(sum) = sum.minus_limit(limit, sign) else {
                 continue;
             };

@@ -204,7 +204,8 @@ impl Closed {
             for &(from, first, _) in entering {
                 for &(to, second) in &leaving[point] {
                     let sum = first + second;
-                    self.has_edge(from, to, &sum).ok_or(Flaw::NotClosed(point))?;
+                    self.has_edge(from, to, &sum)
+                        .ok_or(Flaw::NotClosed(point))?;
                 }
             }
         }

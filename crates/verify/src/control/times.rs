@@ -80,7 +80,9 @@ pub(super) fn limit(
         Limit::Number(number) => Ok(Some(number.0.clone())),
         Limit::Parameter(parameter) => {
             let end = &intervals.of(*parameter)?[usize::from(is_lower)];
-            end.clone().map(Some).ok_or(Flaw::ConstraintViolated(constraint))
+            end.clone()
+                .map(Some)
+                .ok_or(Flaw::ConstraintViolated(constraint))
         }
     }
 }

@@ -55,10 +55,12 @@ impl Histories<'_> {
         let fails = |point: usize| {
             let condition = match subject.points[point].kind {
                 PointKind::Zero | PointKind::Timed(_) => return false,
-                PointKind::Instant(step) | PointKind::Start(step) => match &subject.steps[step].action.body {
-                    Body::Instantaneous(snap) => &snap.condition,
-                    Body::Durative(body) => &body.start.condition,
-                },
+                PointKind::Instant(step) | PointKind::Start(step) => {
+                    match &subject.steps[step].action.body {
+                        Body::Instantaneous(snap) => &snap.condition,
+                        Body::Durative(body) => &body.start.condition,
+                    }
+                }
                 PointKind::End(step) => match &subject.steps[step].action.body {
                     Body::Instantaneous(_) => return false,
                     Body::Durative(body) => &body.end.condition,

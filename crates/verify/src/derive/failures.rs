@@ -10,7 +10,7 @@ use super::histories::{Histories, Value};
 use super::linear::{Inequality, Linear};
 use super::offset_components::OffsetComponents;
 use super::point_state::{PointState, compared};
-use super::subject::{Subject, PointKind};
+use super::subject::{PointKind, Subject};
 
 /// The limit on the sets of points that can come before a moment inside an action.
 const MAX_SETS: usize = 4096;

@@ -20,7 +20,7 @@ use super::distances::Distances;
 use super::linear::Linear;
 use super::offset_components::OffsetComponents;
 use super::point_state::{PointState, combined, negated, quotient};
-use super::subject::{Subject, PointKind, is_always_defined};
+use super::subject::{PointKind, Subject, is_always_defined};
 
 /// A number at one moment.
 #[derive(Clone, Debug)]
@@ -118,13 +118,15 @@ impl<'a> Histories<'a> {
                 let changes = subject.task.timed()[index].changes.iter();
                 self.apply(point, changes.collect())
             }
-            PointKind::Instant(step) | PointKind::Start(step) => match &subject.steps[step].action.body {
-                Body::Instantaneous(snap) => self.record_effects(point, step, &snap.effects),
-                Body::Durative(body) => {
-                    self.record_effects(point, step, &body.start.effects)?;
-                    self.start_continuous(point, step, body, widest)
+            PointKind::Instant(step) | PointKind::Start(step) => {
+                match &subject.steps[step].action.body {
+                    Body::Instantaneous(snap) => self.record_effects(point, step, &snap.effects),
+                    Body::Durative(body) => {
+                        self.record_effects(point, step, &body.start.effects)?;
+                        self.start_continuous(point, step, body, widest)
+                    }
                 }
-            },
+            }
             PointKind::End(step) => {
                 let Some(body) = subject.steps[step].action.durative() else {
                     return Ok(());
@@ -142,7 +144,12 @@ impl<'a> Histories<'a> {
     }
 
     /// Records the effects of a snap action.
-    fn record_effects(&mut self, point: usize, step: usize, effects: &'a [Effect]) -> Result<(), NotDerived> {
+    fn record_effects(
+        &mut self,
+        point: usize,
+        step: usize,
+        effects: &'a [Effect],
+    ) -> Result<(), NotDerived> {
         let changes = self.changes(point, step, effects)?;
         self.apply(point, changes)
     }
@@ -274,7 +281,9 @@ impl<'a> Histories<'a> {
             UpdateOperator::Assign => FluentChange::Set(amount),
             UpdateOperator::Increase => FluentChange::Shift(amount),
             UpdateOperator::Decrease => FluentChange::Shift(negated(amount)),
-            UpdateOperator::ScaleUp => FluentChange::Set(combined(&before, &amount, Linear::product)),
+            UpdateOperator::ScaleUp => {
+                FluentChange::Set(combined(&before, &amount, Linear::product))
+            }
             UpdateOperator::ScaleDown => FluentChange::Set(combined(&before, &amount, quotient)),
         })
     }

@@ -6,9 +6,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use elbowroom_model::Footprint;
 use elbowroom_num::Rational;
 
-use super::trajectory::TrajectoryDerivation;
 use super::histories::Histories;
-use super::subject::{Point, Subject, PointKind};
+use super::subject::{Point, PointKind, Subject};
+use super::trajectory::TrajectoryDerivation;
 use super::{NotDerived, Quantity};
 use crate::certificate::{Certificate, Constraint, Guarantee, Limit, Part, Proof};
 
@@ -231,7 +231,9 @@ impl Reader<'_> {
         }
         let (step, group) = match self.subject.points[point].kind {
             PointKind::Timed(group) => (None, Some(group)),
-            PointKind::Start(step) | PointKind::Instant(step) | PointKind::End(step) => (Some(step), None),
+            PointKind::Start(step) | PointKind::Instant(step) | PointKind::End(step) => {
+                (Some(step), None)
+            }
             PointKind::Zero => (None, None),
         };
         let action = step.map(|step| self.subject.steps[step].action.name.clone());
@@ -263,7 +265,10 @@ impl Reader<'_> {
         let (Some(first), Some(second)) = (points.get(from), points.get(to)) else {
             return false;
         };
-        let are_timed = matches!((first.kind, second.kind), (PointKind::Timed(_), PointKind::Timed(_)));
+        let are_timed = matches!(
+            (first.kind, second.kind),
+            (PointKind::Timed(_), PointKind::Timed(_))
+        );
         let interfere =
             first.time < second.time && first.footprint.interferes_with(&second.footprint);
         // Timed initials may be as near to each other as in the problem.
@@ -271,7 +276,8 @@ impl Reader<'_> {
         if are_timed {
             apart = apart.min(&second.time - &first.time);
         }
-        let keeps_apart = self.sides.contains(&(from, to)) || self.is_end_before_next_start(first, second);
+        let keeps_apart =
+            self.sides.contains(&(from, to)) || self.is_end_before_next_start(first, second);
         (interfere && least.0 <= apart) || (keeps_apart && least.0 <= Rational::ZERO)
     }
 

@@ -82,7 +82,8 @@ impl Numbers<'_> {
             (place.end, &place.after)
         };
         for &point in others.iter().chain([&edge]) {
-            let expression = substitute_time(&inequality.expression, moment, &self.places.time(point));
+            let expression =
+                substitute_time(&inequality.expression, moment, &self.places.time(point));
             // The moment may be at the time of a point that comes before it, but of no other.
             let is_open = !is_early || point == edge;
             if self.is_positive(&expression, inequality.is_strict || is_open)? {
@@ -203,7 +204,11 @@ impl Numbers<'_> {
     }
 
     /// Returns `true` if the failure implies all bounds of a way that the certificate refutes.
-    fn implies_violation(&mut self, failure: &Failure, way: &sound::Violation) -> Result<bool, Flaw> {
+    fn implies_violation(
+        &mut self,
+        failure: &Failure,
+        way: &sound::Violation,
+    ) -> Result<bool, Flaw> {
         for own in &way.inequalities {
             let Some(own) = self.inequality(own) else {
                 return Ok(false);
@@ -293,7 +298,8 @@ impl Numbers<'_> {
         let mut rows = Vec::new();
         let edges = [place.start, place.end];
         for &point in edges.iter().chain(&place.before).chain(&place.after) {
-            let expression = substitute_time(&inequality.expression, moment, &self.places.time(point));
+            let expression =
+                substitute_time(&inequality.expression, moment, &self.places.time(point));
             if expression.times.is_empty()
                 && !expression.parameters.is_empty()
                 && self.is_possible(place, point, &expression)?

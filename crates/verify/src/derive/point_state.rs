@@ -9,7 +9,7 @@ use elbowroom_model::problem::{Comparison, Unknown};
 use elbowroom_num::Rational;
 
 use super::NotDerived;
-use super::histories::{ContinuousId, Histories, FluentChange, Undetermined, Value};
+use super::histories::{ContinuousId, FluentChange, Histories, Undetermined, Value};
 use super::linear::{Inequality, Linear};
 
 /// The limit on alternatives of one condition.

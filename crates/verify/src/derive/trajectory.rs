@@ -14,7 +14,7 @@ use elbowroom_num::Rational;
 
 use super::NotDerived;
 use super::distances::Distances;
-use super::subject::{Subject, PointKind};
+use super::subject::{PointKind, Subject};
 use crate::certificate::{Constraint, Limit};
 
 /// `least <= time of to - time of from <= most`, which the plan needs because of a constraint on its course.

@@ -9,7 +9,7 @@ use super::failures::Failure;
 use super::histories::Histories;
 use super::linear::Inequality;
 use super::numbers::Numbers;
-use super::subject::{Subject, PointKind, is_condition_of_state};
+use super::subject::{PointKind, Subject, is_condition_of_state};
 use super::{NotDerived, failures};
 
 /// Failures of conditions that no schedule has for values in the box.
@@ -113,7 +113,10 @@ impl Checker<'_, '_> {
                 } else {
                     (later, earlier)
                 };
-                let are_timed = matches!((one.kind, other.kind), (PointKind::Timed(_), PointKind::Timed(_)));
+                let are_timed = matches!(
+                    (one.kind, other.kind),
+                    (PointKind::Timed(_), PointKind::Timed(_))
+                );
                 let apart = (&one.time - &other.time).abs();
                 let least = if are_timed {
                     apart.min(epsilon.clone())
@@ -148,7 +151,11 @@ impl Checker<'_, '_> {
     /// Returns `true` if a fact keeps its wanted truth value throughout a step. It has the value initially, or
     /// a point no later than the start establishes it. All points that may change it come before that point,
     /// or after the end.
-    fn is_preserved(&mut self, step: usize, (fact, wanted): (FactId, bool)) -> Result<bool, NotDerived> {
+    fn is_preserved(
+        &mut self,
+        step: usize,
+        (fact, wanted): (FactId, bool),
+    ) -> Result<bool, NotDerived> {
         let subject = self.subject;
         let [start, end] = subject.ends[step];
         let spoils = |index: &usize| subject.points[*index].threatens(fact, wanted);

@@ -13,10 +13,10 @@
 //! does not list may have any value. It may have more facts than the covered state if these never
 //! do harm (`welcome`). Interchangeable objects (`alike`) may be exchanged.
 
-pub(super) mod symmetry;
-mod relevant_symbols;
-mod partial_state;
 mod format;
+mod partial_state;
+mod relevant_symbols;
+pub(super) mod symmetry;
 pub mod zone;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -29,9 +29,9 @@ use elbowroom_num::Rational;
 use super::instances::Instances;
 use super::processes::Process;
 use super::{NoPlanFlaw, ReachedFacts};
-use symmetry::Exchange;
-use partial_state::{View, updated};
 pub use format::{ClosedSet, ClosedState};
+use partial_state::{View, updated};
+use symmetry::Exchange;
 use zone::Zone;
 
 /// Positions of time 0, of the current time, and of the first start of a running action among the

@@ -5,7 +5,7 @@ use elbowroom_model::ground::{Condition, DurativeBody, SnapAction};
 use elbowroom_model::problem::Comparison;
 use elbowroom_num::Rational;
 
-use super::static_facts::{StaticFacts, Span, Value};
+use super::static_facts::{Span, StaticFacts, Value};
 use super::{Fact, ReachedFacts};
 
 /// Information that the check of a condition uses.
@@ -144,7 +144,8 @@ impl EarliestTimes<'_> {
 
     /// Returns `true` if a condition holds at no time by the problem itself.
     fn never_holds(&self, condition: &Condition) -> bool {
-        self.next(condition, self.now, ConditionContext::StaticOnly).is_none()
+        self.next(condition, self.now, ConditionContext::StaticOnly)
+            .is_none()
     }
 
     /// Returns `true` if a condition can hold after all timed initials have happened.
@@ -158,9 +159,9 @@ impl EarliestTimes<'_> {
             }
             Condition::And(parts) => parts.iter().all(|part| self.can_hold_at_end(part)),
             Condition::Or(parts) => parts.iter().any(|part| self.can_hold_at_end(part)),
-            Condition::Compare(..) | Condition::Not(_) => {
-                self.next(condition, self.now, ConditionContext::All).is_some()
-            }
+            Condition::Compare(..) | Condition::Not(_) => self
+                .next(condition, self.now, ConditionContext::All)
+                .is_some(),
         }
     }
 
@@ -171,7 +172,11 @@ impl EarliestTimes<'_> {
 
     /// Returns the earliest start and end of a durative action. `later` limits its later
     /// conditions.
-    pub(super) fn ends(&self, body: &DurativeBody, later: ConditionContext) -> Option<(Rational, Rational)> {
+    pub(super) fn ends(
+        &self,
+        body: &DurativeBody,
+        later: ConditionContext,
+    ) -> Option<(Rational, Rational)> {
         self.starts(body, self.now, ConditionContext::All, later)
     }
 

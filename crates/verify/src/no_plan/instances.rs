@@ -7,10 +7,10 @@ use elbowroom_model::problem::{self, Condition, ObjectId, PredicateId, SchemaId,
 use elbowroom_model::{RunningAction, Situation, Task};
 use elbowroom_num::Rational;
 
+use super::earliest_times::ConditionContext;
 use super::initial_state::{InitialState, lasting};
 use super::static_facts::StaticFacts;
-use super::earliest_times::ConditionContext;
-use super::{Fact, EarliestTimes, NoPlanFlaw, ReachedFacts};
+use super::{EarliestTimes, Fact, NoPlanFlaw, ReachedFacts};
 
 /// A fact that can become true although it is not listed, or earlier than listed.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -218,7 +218,8 @@ impl Instances {
 
     /// Returns `true` if the list does not exclude the goal.
     pub fn is_goal_in_reach(&self, reached: &ReachedFacts) -> bool {
-        self.earliest_times(reached).can_hold_at_end(self.task.goal())
+        self.earliest_times(reached)
+            .can_hold_at_end(self.task.goal())
     }
 
     pub(super) fn earliest_times<'a>(&'a self, reached: &'a ReachedFacts) -> EarliestTimes<'a> {
@@ -266,7 +267,10 @@ fn achievable_facts(moments: &EarliestTimes<'_>, action: &Action) -> Vec<(Fact, 
 }
 
 /// Returns the facts that the end of a running action adds, with their earliest times.
-fn facts_achieved_by_end(moments: &EarliestTimes<'_>, running: &RunningAction) -> Vec<(Fact, Rational)> {
+fn facts_achieved_by_end(
+    moments: &EarliestTimes<'_>,
+    running: &RunningAction,
+) -> Vec<(Fact, Rational)> {
     let Some(body) = running.action.durative() else {
         return Vec::new();
     };
@@ -291,7 +295,11 @@ fn facts_achieved_by_end(moments: &EarliestTimes<'_>, running: &RunningAction) -
 
 /// Returns the [`Needs`] of a schema. Derived facts are left out, because their rules are ground
 /// only for instances that mention them.
-fn needs(schema: &problem::Schema, lasting: &StaticFacts, derived: &BTreeSet<PredicateId>) -> Needs {
+fn needs(
+    schema: &problem::Schema,
+    lasting: &StaticFacts,
+    derived: &BTreeSet<PredicateId>,
+) -> Needs {
     let mut needs = Needs::default();
     let is_basic = |atom: &problem::Atom| !derived.contains(&atom.predicate);
     match &schema.body {

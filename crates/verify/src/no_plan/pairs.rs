@@ -27,8 +27,8 @@ use elbowroom_model::ground::{Change, Condition};
 use elbowroom_num::Rational;
 
 use super::ReachedFacts;
-use super::instances::Instances;
 use super::earliest_times::{ConditionContext, EarliestTimes};
+use super::instances::Instances;
 use super::processes::{Literal, Process, Snap};
 pub use rules::Claims;
 
@@ -211,7 +211,9 @@ impl<'a> Structure<'a> {
         // A fact that actions make false is an atom, even if no action makes it true.
         let snaps = self.processes.iter();
         let snaps = snaps.flat_map(|process| process.start.iter().chain(&process.end));
-        let makes: BTreeSet<Literal> = snaps.flat_map(|snap| snap.may_make_true.iter().copied()).collect();
+        let makes: BTreeSet<Literal> = snaps
+            .flat_map(|snap| snap.may_make_true.iter().copied())
+            .collect();
         let is_timed_only = |(fact, is_true): &Literal| {
             *is_true && !makes.contains(&(*fact, false)) && instances.is_timed_only(*fact)
         };
@@ -286,7 +288,12 @@ impl<'a> Structure<'a> {
                 operator.holds = over_all.iter().copied().filter(is_others).collect();
                 operator.adds.extend(running);
                 let first = if let Some(body) = process.durative() {
-                    let first = moments.starts(body, now, ConditionContext::StaticOnly, ConditionContext::StaticOnly);
+                    let first = moments.starts(
+                        body,
+                        now,
+                        ConditionContext::StaticOnly,
+                        ConditionContext::StaticOnly,
+                    );
                     operator.has_windows = moments.is_timed(&body.start.condition)
                         || moments.is_timed(&body.over_all)
                         || moments.is_timed(&body.end.condition);

@@ -245,7 +245,10 @@ impl Process {
         let flows = self
             .durative()
             .is_some_and(|body| !body.continuous.is_empty());
-        is_fixed && self.initial_start.is_none() && !flows && snaps.into_iter().all(|s| !s.changes_numbers)
+        is_fixed
+            && self.initial_start.is_none()
+            && !flows
+            && snaps.into_iter().all(|s| !s.changes_numbers)
     }
 }
 

@@ -14,7 +14,11 @@ impl Instances {
     /// If the goal reads such fluents, they are the result. Otherwise the result is empty if values would
     /// not bring the goal within reach. A fluent counts if an instance reads it that contributes to a part
     /// of the goal that is out of reach, or to any part if the whole goal is within reach of `stated`.
-    pub fn fluents_without_value(&self, reached: &ReachedFacts, stated: &ReachedFacts) -> Vec<String> {
+    pub fn fluents_without_value(
+        &self,
+        reached: &ReachedFacts,
+        stated: &ReachedFacts,
+    ) -> Vec<String> {
         let goal = self.task.goal();
         let mut found = BTreeSet::new();
         self.static_facts

@@ -5,19 +5,19 @@ use std::sync::Arc;
 
 use elbowroom::answers::region::{
     BoxAnswer, Measure, Others, PictureError, PieceAnswer, Plane, RegionFinding, RegionOutcome,
-    RegionSettings, picture, region, partial_result,
+    RegionSettings, partial_result, picture, region,
 };
 use elbowroom::answers::{EnvelopeRequest, Observer};
 
 use super::{failure, specifications};
 use crate::args::{self, EnvelopeArgs};
-use crate::exit::{Answer, Exit, Failure};
 use crate::deadline::run_with_deadline;
+use crate::exit::{Answer, Exit, Failure};
 use crate::input;
 use crate::interrupt::Interrupt;
 use crate::limits::push_wrapped;
-use crate::terminal::{ERROR, SECONDARY, SUCCESS, HINT, TextLayout, styled};
 use crate::output::{self, Output};
+use crate::terminal::{ERROR, HINT, SECONDARY, SUCCESS, TextLayout, styled};
 use crate::time_limit::{Stopwatch, duration};
 use elbowroom_executive::messages::count_with_noun;
 

@@ -11,7 +11,7 @@ use std::thread;
 use std::time::Duration;
 
 use elbowroom::answers::envelope::{EnvelopeOutcome, EnvelopeRequest, envelope, partial_result};
-use elbowroom::answers::{Event, StopRequest, RequestError, Observer};
+use elbowroom::answers::{Event, Observer, RequestError, StopRequest};
 use elbowroom::plan::{DecoupledEnvelope, ParametrizedPlan};
 
 use crate::args::EnvelopeArgs;
@@ -60,10 +60,12 @@ impl EnvelopeMonitor {
         };
         let (sender, receiver) = mpsc::channel();
         let theirs = Arc::clone(request);
-        let worker = thread::Builder::new().stack_size(STACK_SIZE).spawn(move || {
-            // After the time limit, the receiver is gone.
-            let _ = sender.send(envelope(&theirs, &mut listener));
-        });
+        let worker = thread::Builder::new()
+            .stack_size(STACK_SIZE)
+            .spawn(move || {
+                // After the time limit, the receiver is gone.
+                let _ = sender.send(envelope(&theirs, &mut listener));
+            });
         if worker.is_err() {
             // No thread is available: the limit is checked between steps only.
             return envelope(request, &mut self.stopwatch);

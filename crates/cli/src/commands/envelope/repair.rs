@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use elbowroom::answers::RequestError;
 use elbowroom::answers::repair::{
-    Change, Orders, RepairFinding, RepairOutcome, RepairRequest, repair, partial_result,
+    Change, Orders, RepairFinding, RepairOutcome, RepairRequest, partial_result, repair,
 };
 use elbowroom::model::TimeTriggeredPlan;
 use elbowroom::num::Rational;
@@ -13,13 +13,13 @@ use elbowroom::{AnyPlan, plan_text};
 
 use super::failure;
 use crate::args::EnvelopeArgs;
-use crate::exit::{Answer, Exit, Failure};
 use crate::deadline::run_with_deadline;
+use crate::exit::{Answer, Exit, Failure};
 use crate::input;
 use crate::interrupt::Interrupt;
 use crate::limits::push_wrapped;
-use crate::terminal::{ERROR, SUCCESS, HINT, TextLayout, EMPHASIS, styled};
 use crate::output::{self, Output};
+use crate::terminal::{EMPHASIS, ERROR, HINT, SUCCESS, TextLayout, styled};
 use crate::time_limit::{Stopwatch, duration};
 
 /// Number of digits printed; `--json` has exact numbers.

@@ -7,17 +7,18 @@ mod timeouts;
 use std::fmt::Write as _;
 
 use elbowroom::answers::envelope::{
-    UniformSlack, Best, ChosenDuration, Conditions, Deviation, EnvelopeFinding, EnvelopeOutcome,
-    EnvelopeRequest, NominalFailure, ValueOfInformation, Makespans, QuantityKind, Range, LimitedRange, Stop,
+    Best, ChosenDuration, Conditions, Deviation, EnvelopeFinding, EnvelopeOutcome, EnvelopeRequest,
+    LimitedRange, Makespans, NominalFailure, QuantityKind, Range, Stop, UniformSlack,
+    ValueOfInformation,
 };
 
 use elbowroom::num::Rational;
 
 use crate::args::Order;
 use crate::limits::{self, push_paragraph, push_wrapped};
-use crate::terminal::{ERROR, SECONDARY, SUCCESS, TextLayout, EMPHASIS, styled};
 use crate::number::{self, Rounding};
 use crate::table::{self, Row};
+use crate::terminal::{EMPHASIS, ERROR, SECONDARY, SUCCESS, TextLayout, styled};
 use best::{best_relaxations, objective_text};
 use elbowroom_executive::messages::count_with_noun;
 use example::{example, reason_text};
@@ -37,7 +38,9 @@ pub(super) fn text(
             push_wrapped(&mut text, &violation.message, 2, look.width);
             text
         }
-        EnvelopeFinding::Fails(NominalFailure::AsPlanned { .. }) => failure_text(request, outcome, look),
+        EnvelopeFinding::Fails(NominalFailure::AsPlanned { .. }) => {
+            failure_text(request, outcome, look)
+        }
         EnvelopeFinding::Inside { .. } => format!(
             "{}: {file} works everywhere in this box\n",
             styled(SUCCESS, "inside"),
@@ -85,7 +88,8 @@ fn failure_text(request: &EnvelopeRequest, outcome: &EnvelopeOutcome, look: Text
 /// Appends the time-out that an action reaches, if there is no other reason.
 fn push_timeout(text: &mut String, outcome: &EnvelopeOutcome, look: TextLayout) {
     let (EnvelopeFinding::Outside { counterexample, .. }
-    | EnvelopeFinding::Fails(NominalFailure::AsPlanned { counterexample, .. })) = &outcome.answer.finding
+    | EnvelopeFinding::Fails(NominalFailure::AsPlanned { counterexample, .. })) =
+        &outcome.answer.finding
     else {
         return;
     };
@@ -159,7 +163,11 @@ fn envelope(
     }
     text.push_str(&table::render(&rows, look));
     text.push('\n');
-    push_paragraph(&mut text, &timeouts::guarantee_text(parameters, &rows), look.width);
+    push_paragraph(
+        &mut text,
+        &timeouts::guarantee_text(parameters, &rows),
+        look.width,
+    );
     if let Some(timeouts) = timeouts::timeout_line(&request.timeout, parameters, chosen) {
         push_paragraph(&mut text, &timeouts, look.width);
     }

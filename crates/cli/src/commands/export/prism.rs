@@ -54,7 +54,8 @@ pub(super) fn text(arguments: &ExportArgs, output: &mut Output) -> Result<String
     let written = if let Some(path) = &process.likelihoods {
         let text = input::source(path, "likelihoods")?;
         let likelihoods = likelihoods::read(text, &task).map_err(|wrong| {
-            Failure::from(wrong).with_default_advice("docs/formats/likelihoods.md describes likelihood files")
+            Failure::from(wrong)
+                .with_default_advice("docs/formats/likelihoods.md describes likelihood files")
         })?;
         let lost = optimum::Settings::default();
         let settings = optimum::Settings {

@@ -9,7 +9,7 @@ use elbowroom::answers::odds::{
 use elbowroom::report::table::Table;
 
 use crate::limits::push_paragraph;
-use crate::terminal::{ERROR, HINT, TextLayout, EMPHASIS, styled};
+use crate::terminal::{EMPHASIS, ERROR, HINT, TextLayout, styled};
 use elbowroom_executive::messages::count_with_noun;
 
 /// Maximum number of losses, or of possible gains, that are listed.

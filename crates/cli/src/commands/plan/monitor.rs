@@ -4,7 +4,7 @@ use std::fmt::{self, Write as _};
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use elbowroom::answers::{Event, StopRequest, PlanProgress, Observer};
+use elbowroom::answers::{Event, Observer, PlanProgress, StopRequest};
 use elbowroom::num::Rational;
 
 use crate::args::PlanArgs;

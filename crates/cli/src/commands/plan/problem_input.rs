@@ -5,7 +5,7 @@ use std::sync::mpsc::{self, RecvTimeoutError};
 use std::thread;
 use std::time::Duration;
 
-use elbowroom::answers::{StopRequest, Observer};
+use elbowroom::answers::{Observer, StopRequest};
 
 use super::monitor::PlanMonitor;
 use crate::args::PlanArgs;

@@ -9,8 +9,8 @@ use elbowroom::verify::no_plan::Kind;
 
 use crate::args::EMBEDDED;
 use crate::exit::Failure;
-use crate::terminal::{SECONDARY, HINT, TextLayout, styled};
 use crate::number;
+use crate::terminal::{HINT, SECONDARY, TextLayout, styled};
 use crate::wrap::wrap;
 use elbowroom_executive::messages::count_with_noun;
 

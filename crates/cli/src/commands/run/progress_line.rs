@@ -47,7 +47,10 @@ impl ProgressLine {
                 (false, false) => names.join(", "),
             };
             let time = number::nearest(now);
-            format!("at {time}: {what}; {}", count_with_noun(replans, "new plan"))
+            format!(
+                "at {time}: {what}; {}",
+                count_with_noun(replans, "new plan")
+            )
         });
     }
 

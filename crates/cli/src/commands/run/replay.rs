@@ -6,14 +6,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use elbowroom::answers::run::run as execute;
-use elbowroom::answers::{StopRequest, RunRequest, Observer};
+use elbowroom::answers::{Observer, RunRequest, StopRequest};
 use elbowroom::execute::RunSpec;
 use elbowroom::report::trace::{Line, Replay, ReplayPlanner, ReplayPreparer, ReplayWorld, Stored};
 use serde_json::{Value, json};
 
 use crate::exit::{Answer, Exit, Failure};
-use crate::terminal::{ERROR, SUCCESS, styled};
 use crate::output::Output;
+use crate::terminal::{ERROR, SUCCESS, styled};
 use crate::{input, output};
 
 pub(super) fn run(path: &Path, as_json: bool, output: &mut Output) -> Answer {

@@ -4,7 +4,8 @@ use std::path::Path;
 
 use elbowroom::answers::learn::known_sections;
 use elbowroom::execute::{
-    FirstPlan, FirstPlanError, MOST_STATES, NamedText, RunSpec, SpecError, AdversarySettings, AdversaryError,
+    AdversaryError, AdversarySettings, FirstPlan, FirstPlanError, MOST_STATES, NamedText, RunSpec,
+    SpecError,
 };
 use elbowroom::execution::run::{PlanningTime, RunningRule};
 use elbowroom::model::Problem;

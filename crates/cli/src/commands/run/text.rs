@@ -6,8 +6,8 @@ use elbowroom::answers::run::RunAnswer;
 use elbowroom::execution::Ending;
 use elbowroom::execution::run::{Report, Verdict};
 
-use crate::terminal::{ERROR, SUCCESS, HINT, TextLayout, EMPHASIS, styled};
 use crate::number::nearest;
+use crate::terminal::{EMPHASIS, ERROR, HINT, SUCCESS, TextLayout, styled};
 use crate::wrap::wrap;
 use elbowroom_executive::messages::{count_with_noun, escape_control};
 

@@ -26,7 +26,10 @@ impl TraceFile {
             let name = path.display().to_string();
             let file = File::create(path).map_err(|error| {
                 Failure::new(
-                    format!("cannot write the trace {name}: {}", io_error_message(&error)),
+                    format!(
+                        "cannot write the trace {name}: {}",
+                        io_error_message(&error)
+                    ),
                     "choose a file in a folder that exists and that you may write to",
                 )
             })?;

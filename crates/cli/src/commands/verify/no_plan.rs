@@ -11,9 +11,9 @@ use crate::args::{ProblemArgs, VerifyArgs};
 use crate::exit::{Answer, Exit, Failure};
 use crate::input;
 use crate::limits::push_wrapped;
-use crate::terminal::{ERROR, SUCCESS, TextLayout, styled};
 use crate::number::nearest;
 use crate::output::{self, Output};
+use crate::terminal::{ERROR, SUCCESS, TextLayout, styled};
 use elbowroom_executive::messages::count_with_noun;
 
 /// Returns `true` if the text is an answer of `elbowroom plan`.
@@ -83,7 +83,10 @@ pub(super) fn run(arguments: &VerifyArgs, source: &Source, output: &mut Output) 
                     let apart = nearest(&epsilon);
                     format!(" with interfering happenings at least {apart} apart")
                 };
-                format!("{problem} has no plan{apart}: {}", reason_text(&certificate))
+                format!(
+                    "{problem} has no plan{apart}: {}",
+                    reason_text(&certificate)
+                )
             }
             Err(flaw) => format!("{flaw}."),
         };

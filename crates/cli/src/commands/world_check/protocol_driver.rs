@@ -16,8 +16,8 @@ use super::table::{Check, Findings};
 use elbowroom_executive::clock::Clock;
 use elbowroom_executive::messages::excerpt;
 use elbowroom_executive::world_protocol::{
-    Capability, Greeting, MAX_ANSWER, LineReader, LineWriter, Message, MessageParser,
-    ReadResult, WriteResult, belief_message, hello, wait_for_exit,
+    Capability, Greeting, LineReader, LineWriter, MAX_ANSWER, Message, MessageParser, ReadResult,
+    WriteResult, belief_message, hello, wait_for_exit,
 };
 
 /// Maximum time from `stop` to the exit of the world.
@@ -271,7 +271,10 @@ impl ProtocolDriver {
     }
 
     fn send(&mut self, message: &Value) -> Result<(), WorldLost> {
-        match self.writer.write(format!("{message}\n"), self.answer_timeout) {
+        match self
+            .writer
+            .write(format!("{message}\n"), self.answer_timeout)
+        {
             WriteResult::Written => Ok(()),
             WriteResult::Timeout => {
                 let what = message["type"].as_str().unwrap_or_default();

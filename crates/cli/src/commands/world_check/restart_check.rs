@@ -6,9 +6,9 @@ use std::sync::Arc;
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
 
-use super::protocol_driver::{WorldLost, ProtocolDriver};
+use super::protocol_driver::{ProtocolDriver, WorldLost};
 use super::table::{Check, Findings};
-use super::{longest, advance_until, wait_for_starts};
+use super::{advance_until, longest, wait_for_starts};
 use elbowroom_executive::messages::excerpt;
 use elbowroom_executive::world_protocol::{Capability, launch};
 
@@ -63,7 +63,11 @@ pub(super) fn check_restart(
 }
 
 /// Checks what the restarted world reports of its earlier starts.
-fn check_recalled(player: &mut ProtocolDriver, killed: &Rational, duration: &Rational) -> Result<(), WorldLost> {
+fn check_recalled(
+    player: &mut ProtocolDriver,
+    killed: &Rational,
+    duration: &Rational,
+) -> Result<(), WorldLost> {
     player.recall(&[ENDED_TICKET, RUNNING_TICKET, UNKNOWN_TICKET])?;
     player.findings.mark_done(Check::Resumes);
     if !player.can(Capability::Resume) {
@@ -99,7 +103,9 @@ fn check_recalled(player: &mut ProtocolDriver, killed: &Rational, duration: &Rat
     }
     let long = longest(duration);
     let step = (duration / Rational::from(10)).max(Rational::ONE);
-    advance_until(player, &long, &step, |player| !player.is_running(RUNNING_TICKET))?;
+    advance_until(player, &long, &step, |player| {
+        !player.is_running(RUNNING_TICKET)
+    })?;
     if player.is_running(RUNNING_TICKET) {
         let why = format!(
             "start {RUNNING_TICKET} had not ended {} s after it was started again",
@@ -119,8 +125,9 @@ fn check_recalled(player: &mut ProtocolDriver, killed: &Rational, duration: &Rat
     }
     if player.has_begun(UNKNOWN_TICKET) {
         let name = excerpt(player.name_of(UNKNOWN_TICKET));
-        let why =
-            format!("it never received start {UNKNOWN_TICKET}, and reports that {name} was started for it");
+        let why = format!(
+            "it never received start {UNKNOWN_TICKET}, and reports that {name} was started for it"
+        );
         player.findings.record_violation(Check::Resumes, why);
     }
     Ok(())

@@ -26,7 +26,11 @@ pub(super) enum Check {
 impl Check {
     /// All checks in the order of display, each with a keyword and a description.
     pub(super) const ALL: [(Self, &str, &str); 16] = [
-        (Self::KeepsRunning, "lives", "it runs until it receives `stop`"),
+        (
+            Self::KeepsRunning,
+            "lives",
+            "it runs until it receives `stop`",
+        ),
         (
             Self::SpeaksProtocol,
             "speaks",

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use elbowroom_execution::{BeliefState, ActionHandle};
+use elbowroom_execution::{ActionHandle, BeliefState};
 use elbowroom_model::ground::Condition;
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;

@@ -7,7 +7,9 @@ use elbowroom_plan::Side;
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
-use super::{UniformSlack, Best, Conditions, EnvelopeRequest, ValueOfInformation, Inequalities, Timeline};
+use super::{
+    Best, Conditions, EnvelopeRequest, Inequalities, Timeline, UniformSlack, ValueOfInformation,
+};
 use crate::answers::{Exact, Version, ViolationAnswer, exact};
 use crate::execute::as_text;
 

@@ -9,8 +9,8 @@ use elbowroom_plan::{
 
 use super::Subject;
 use super::answer::{
-    ChosenDuration, Counterexample, ActionTimes, Makespans, MovedEnd, Quantity, QuantityKind, Range, LimitedRange,
-    Stop, WideningStep,
+    ActionTimes, ChosenDuration, Counterexample, LimitedRange, Makespans, MovedEnd, Quantity,
+    QuantityKind, Range, Stop, WideningStep,
 };
 use super::timeouts::timeouts;
 use crate::answers::{Exact, StopRequest};

@@ -1,6 +1,6 @@
 //! The largest box, and its objective.
 
-use elbowroom_envelope::{BestRun, BestSettings, LOG_OF_ZERO, Objective, Oracle, OptimalityProof};
+use elbowroom_envelope::{BestRun, BestSettings, LOG_OF_ZERO, Objective, OptimalityProof, Oracle};
 use elbowroom_num::{End, Rational, enclosures};
 use elbowroom_verify::{Certificate, Chance};
 use serde::{Deserialize, Serialize};

@@ -35,7 +35,8 @@ pub(super) fn limits_of_ends(
         } else if how.relative.is_none() && !nominal.is_zero() {
             // The search may have tried this end in large steps only; a smaller step finds the
             // nearest limit.
-            let near = &nominal * &Rational::new(MOST_REPORTED_DISTANCE.0, MOST_REPORTED_DISTANCE.1);
+            let near =
+                &nominal * &Rational::new(MOST_REPORTED_DISTANCE.0, MOST_REPORTED_DISTANCE.1);
             *distance = near.min(distance.clone());
         }
     }
@@ -47,11 +48,19 @@ pub(super) fn limits_of_ends(
         let open: Vec<BoxEnd> = BoxEnd::all(words.len()).filter(is_open).collect();
         let mut tell = |end: BoxEnd, limit: &Limit| {
             let own = (end.parameter, end.side);
-            let reason = subject.explainer.limit_with_known_conflicts(own, limit, &mut seen);
+            let reason = subject
+                .explainer
+                .limit_with_known_conflicts(own, limit, &mut seen);
             words[end.parameter.index()][end.side.index()] = reason;
         };
         let which = (&open[..], &distances[..]);
-        limits(oracle, envelope, which, &mut || continue_or_stop(watcher), &mut tell);
+        limits(
+            oracle,
+            envelope,
+            which,
+            &mut || continue_or_stop(watcher),
+            &mut tell,
+        );
         if continue_or_stop(watcher).is_break() {
             break;
         }

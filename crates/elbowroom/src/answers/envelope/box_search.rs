@@ -65,7 +65,8 @@ pub(crate) fn grow(
     };
     let mut settings = search.best.clone();
     if settings.objective == Objective::Probability {
-        settings.distributions = duration_distributions(&plan, world.ok_or(DistributionError::NoWorld)?)?;
+        settings.distributions =
+            duration_distributions(&plan, world.ok_or(DistributionError::NoWorld)?)?;
     }
     let most_checks = search.most_checks.unwrap_or(usize::MAX);
     let mut has_checks = true;

@@ -7,15 +7,17 @@ mod network;
 use std::collections::BTreeMap;
 
 use elbowroom_envelope::{
-    BestProof, BestSettings, Cut, Ground, Guarantee, BoxVariable, Objective, Oracle,
+    BestProof, BestSettings, BoxVariable, Cut, Ground, Guarantee, Objective, Oracle,
 };
-use elbowroom_envelope::{ProofCase as KnownCase, OptimalityProof as KnownReasons, BoundSource as KnownSource};
+use elbowroom_envelope::{
+    BoundSource as KnownSource, OptimalityProof as KnownReasons, ProofCase as KnownCase,
+};
 use elbowroom_envelope::{ProofPart, ProofPath, volume_foot};
 use elbowroom_num::Rational;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, Origin, ParametrizedPlan, Side};
 use elbowroom_verify::{
-    Case, Certificate, Constraint, End, Exact, Multiplier, Parameter, Part, Proof, Reasons, Source,
-    Stopped, Sum, Term, Total, Path, with_sums,
+    Case, Certificate, Constraint, End, Exact, Multiplier, Parameter, Part, Path, Proof, Reasons,
+    Source, Stopped, Sum, Term, Total, with_sums,
 };
 
 use super::Subject;
@@ -55,7 +57,8 @@ pub(super) fn certificate(
             .iter()
             .position(|own| own.ends.iter().any(moves))?;
         let own = &proof.variables[variable];
-        let is_limit = greatest_gain(plan, settings, own).is_none_or(|gains| own.max_distance < gains);
+        let is_limit =
+            greatest_gain(plan, settings, own).is_none_or(|gains| own.max_distance < gains);
         (is_used[variable] && is_limit).then(|| Exact(own.max_distance.clone()))
     };
     let scale = |parameter: usize| {
@@ -227,7 +230,12 @@ fn fill_start_points(proof: &mut Proof, constraints: &[Constraint]) {
             }
             for place in (0..ways.len()).rev() {
                 let (earlier, own) = ways.split_at_mut(place);
-                let mentioned = fill_start_points_of_parts(&mut own[0].parts, begins[place], earlier, constraints);
+                let mentioned = fill_start_points_of_parts(
+                    &mut own[0].parts,
+                    begins[place],
+                    earlier,
+                    constraints,
+                );
                 for (way, at) in mentioned {
                     begins[way] = at;
                 }

@@ -7,15 +7,15 @@ use elbowroom_envelope::{Oracle, StopReason, Widening, sharpen};
 use elbowroom_plan::DecoupledEnvelope;
 
 use super::answer::{EnvelopeFinding, Makespans, Stop, WideningStep};
-use super::uniform_slack::uniform_slack;
 use super::best::best;
-use super::conditions::Conditions;
-use super::value_of_information::value_of_information;
-use super::box_search::{Step, grow};
 use super::binding_constraints::limits_of_ends;
+use super::box_search::{Step, grow};
+use super::conditions::Conditions;
 use super::timeline::Timeline;
+use super::uniform_slack::uniform_slack;
+use super::value_of_information::value_of_information;
 use super::{EnvelopeOutcome, Inequalities, Subject};
-use crate::answers::{EnvelopeProgress, Event, StopRequest, RequestError, Observer};
+use crate::answers::{EnvelopeProgress, Event, Observer, RequestError, StopRequest};
 use crate::pipeline::PipelineError;
 
 /// Searches for a box, moves its ends onto their limits if requested, and computes these limits.

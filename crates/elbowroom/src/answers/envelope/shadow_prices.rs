@@ -2,7 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use elbowroom_envelope::{BestProof, ProofCase, Cut, Ground, ProofPart, ProofPath, OptimalityProof, BoundSource};
+use elbowroom_envelope::{
+    BestProof, BoundSource, Cut, Ground, OptimalityProof, ProofCase, ProofPart, ProofPath,
+};
 use elbowroom_num::Rational;
 use elbowroom_plan::{Origin, Reason};
 use serde::{Deserialize, Serialize};
@@ -125,8 +127,12 @@ fn bounds(cut: &Cut) -> Vec<(Origin, i64)> {
     let mut found = Vec::new();
     match &cut.ground {
         Ground::Cycle(origins) => found.extend(origins.iter().map(|origin| (*origin, 1))),
-        Ground::Fixed(parts) => parts.iter().for_each(|part| collect_from_part(part, &mut found)),
-        Ground::Semireducible(ways) => ways.iter().for_each(|way| collect_from_way(way, &mut found)),
+        Ground::Fixed(parts) => parts
+            .iter()
+            .for_each(|part| collect_from_part(part, &mut found)),
+        Ground::Semireducible(ways) => ways
+            .iter()
+            .for_each(|way| collect_from_way(way, &mut found)),
         Ground::Condition(_) | Ground::Box(_) => {}
     }
     found

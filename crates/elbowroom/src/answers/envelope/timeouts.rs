@@ -69,7 +69,10 @@ impl PlannedTimeout {
                 Bound::Infinite => None,
             }
         });
-        let told = plan.commanded_durations.iter().map(|(id, planned)| (*id, planned));
+        let told = plan
+            .commanded_durations
+            .iter()
+            .map(|(id, planned)| (*id, planned));
         set.chain(told).find_map(|(id, planned)| {
             let action = &plan.plan.instance(id).action.name;
             let timeout = rule.of(action, planned);

@@ -1,6 +1,6 @@
 //! Deviation of all open quantities at once.
 
-use elbowroom_envelope::{Oracle, DeviationBounds, balance as shares};
+use elbowroom_envelope::{DeviationBounds, Oracle, balance as shares};
 use elbowroom_num::Rational;
 use serde::{Deserialize, Serialize};
 
@@ -42,7 +42,10 @@ impl From<DeviationBounds> for Deviation {
 /// Computes the deviations that all quantities may have at once; `None` if the watcher ends the
 /// work or there are too many cases to distinguish. `oracle` reuses the proofs that it has found
 /// for other boxes.
-pub(super) fn uniform_slack(mut oracle: Oracle, watcher: &mut dyn Observer) -> Option<UniformSlack> {
+pub(super) fn uniform_slack(
+    mut oracle: Oracle,
+    watcher: &mut dyn Observer,
+) -> Option<UniformSlack> {
     let shares = shares(&mut oracle, &mut || continue_or_stop(watcher));
     shares.unwrap_or_default().map(|shares| UniformSlack {
         more: shares.increase.into(),

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Subject;
 use super::search::continue_or_stop;
-use crate::answers::{Exact, RequestError, Observer};
+use crate::answers::{Exact, Observer, RequestError};
 use crate::pipeline::PipelineError;
 
 /// Number of times that the step is doubled to find the limit of an end.
@@ -51,11 +51,15 @@ pub(super) fn value_of_information(
     let weak = Oracle::new(&request.task, subject.plan, Guarantee::Weak);
     let mut weak = weak.map_err(PipelineError::Refused)?;
     let settings = request.search.settings();
-    let run = irr(&mut weak, &settings, &mut |_| continue_or_stop(watcher)).map_err(PipelineError::Refused)?;
+    let run = irr(&mut weak, &settings, &mut |_| continue_or_stop(watcher))
+        .map_err(PipelineError::Refused)?;
     let (StopReason::Converged, Ok(weak)) = (run.stop, run.envelope) else {
         return Ok(None);
     };
-    let (width, weak_width) = (total_width(subject.plan, envelope), total_width(subject.plan, &weak));
+    let (width, weak_width) = (
+        total_width(subject.plan, envelope),
+        total_width(subject.plan, &weak),
+    );
     if weak_width <= width {
         return Ok(None);
     }

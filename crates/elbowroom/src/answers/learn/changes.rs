@@ -122,7 +122,9 @@ fn predicate_of(fact: &str) -> &str {
 /// itself.
 pub(super) fn of(logs: &[Log]) -> Vec<Changes> {
     let courses = || logs.iter().filter_map(|log| log.fact_history.as_ref());
-    let predicates: BTreeSet<String> = courses().flat_map(FactHistory::changing_predicates).collect();
+    let predicates: BTreeSet<String> = courses()
+        .flat_map(FactHistory::changing_predicates)
+        .collect();
     let exposures: Vec<Exposure> = predicates
         .iter()
         .flat_map(|predicate| courses().flat_map(|course| course.exposures(predicate)))

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::AnyPlan;
 use crate::answers::envelope::{EnvelopeRequest, envelope};
-use crate::answers::{RequestError, Observer, exact};
+use crate::answers::{Observer, RequestError, exact};
 use crate::explain::Explainer;
 use crate::pipeline::PipelineError;
 
@@ -182,7 +182,10 @@ pub(super) fn answer(
 
 /// Returns the validator's objection to the plan with all durations at their lower ends, or with
 /// all at their upper ends.
-fn violation_at_interval_ends(explainer: &Explainer<'_>, boxed: &DecoupledEnvelope) -> Option<String> {
+fn violation_at_interval_ends(
+    explainer: &Explainer<'_>,
+    boxed: &DecoupledEnvelope,
+) -> Option<String> {
     Side::BOTH.into_iter().find_map(|side| {
         let mut valuation = explainer.plan.nominal();
         for (index, interval) in boxed.intervals().iter().enumerate() {

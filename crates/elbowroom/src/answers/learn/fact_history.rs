@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use elbowroom_execution::{BeliefState, ActionHandle};
+use elbowroom_execution::{ActionHandle, BeliefState};
 use elbowroom_learning::changes::Exposure;
 use elbowroom_model::Task;
 use elbowroom_model::ground::{Action, Body, Change, Effect, FactId};
@@ -279,7 +279,8 @@ impl TraceReplay {
                     return;
                 }
                 self.state.change_fact(fact, *becomes);
-                let is_undone = self.last_failure.0 == time.0 && self.last_failure.1.contains(&fact);
+                let is_undone =
+                    self.last_failure.0 == time.0 && self.last_failure.1.contains(&fact);
                 self.record_change(fact, &time.0, !is_undone);
                 let state = &self.state;
                 let now = self.failures.iter_mut().rev();
@@ -321,7 +322,12 @@ impl TraceReplay {
     }
 
     /// Runs `what`, and records which of these facts it changes.
-    fn record_changes_at(&mut self, facts: &[FactId], at: &Rational, what: impl FnOnce(&mut BeliefState)) {
+    fn record_changes_at(
+        &mut self,
+        facts: &[FactId],
+        at: &Rational,
+        what: impl FnOnce(&mut BeliefState),
+    ) {
         let before: Vec<bool> = facts.iter().map(|fact| self.state.fact(*fact)).collect();
         what(&mut self.state);
         for (fact, before) in facts.iter().zip(before) {

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Subject, planner};
 use crate::answers::Observer;
-use crate::execute::{PlanPreparer, Execution, CachingPlanner, CachingPreparer};
+use crate::execute::{CachingPlanner, CachingPreparer, Execution, PlanPreparer};
 use crate::pipeline;
 
 /// Maximum number of cached plans.

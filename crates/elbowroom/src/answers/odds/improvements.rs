@@ -7,7 +7,7 @@ use elbowroom_probability::{SearchStop, all_actions_under};
 use serde::{Deserialize, Serialize};
 
 use super::{OrderAnswer, Subject, plan_of_planner};
-use crate::answers::{RequestError, Observer};
+use crate::answers::{Observer, RequestError};
 
 /// The gain of another order, of retrying, and of another plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

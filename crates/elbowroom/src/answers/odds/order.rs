@@ -165,8 +165,8 @@ impl OrderAnswer {
         best: Option<SearchStop>,
     ) -> Result<Self, RequestError> {
         let model = &**subject.search.model();
-        let account =
-            LossAnalysis::of(model, &subject.initial, order).map_err(|error| coupling_error(&error))?;
+        let account = LossAnalysis::of(model, &subject.initial, order)
+            .map_err(|error| coupling_error(&error))?;
         let starts = order.sequence.iter().enumerate().filter(|(_, node)| {
             matches!(
                 model.plan().nodes[node.index()],
@@ -312,7 +312,12 @@ impl LossAnswer {
 }
 
 /// Returns the last happening before a loss that has an effect on the fact.
-fn last_change_before_loss(model: &Model, sequence: &[NodeId], loss: &Loss, fact: FactId) -> Option<String> {
+fn last_change_before_loss(
+    model: &Model,
+    sequence: &[NodeId],
+    loss: &Loss,
+    fact: FactId,
+) -> Option<String> {
     let before = match (loss.position, loss.reading) {
         (None, _) => 0,
         (Some(position), Reading::OnArrival) => position,

@@ -10,10 +10,10 @@ use elbowroom_model::Situation;
 use elbowroom_pddl::Source;
 
 use super::{
-    SearchMonitor, StopRequest, PlanAnswer, PlanFinding, PlanFormat, PlanOutcome, PlanRequest, PlanStatistics,
-    PlanStop, Version,
+    PlanAnswer, PlanFinding, PlanFormat, PlanOutcome, PlanRequest, PlanStatistics, PlanStop,
+    SearchMonitor, StopRequest, Version,
 };
-use crate::answers::{PlanProgress, Observer};
+use crate::answers::{Observer, PlanProgress};
 use crate::pipeline;
 
 /// A planner that failed: it returned neither a plan nor an answer.

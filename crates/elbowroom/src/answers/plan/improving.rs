@@ -12,7 +12,7 @@ use std::time::Duration;
 use elbowroom_model::{Task, TimeTriggeredPlan};
 
 use super::{PlanFinding, PlanOutcome, PlanRequest, plan};
-use crate::answers::{Event, StopRequest, RequestError, Observer};
+use crate::answers::{Event, Observer, RequestError, StopRequest};
 use crate::execute::renumbered;
 
 /// Stack size of the search thread: that of the main thread.
@@ -125,10 +125,12 @@ impl ImprovingPlans {
             return NextPlan::Ended;
         }
         match self.messages.recv_timeout(patience) {
-            Ok(SearchMessage::Better(BetterPlan { plan, finding })) => NextPlan::Better(BetterPlan {
-                plan: self.to_caller_facts(&plan),
-                finding,
-            }),
+            Ok(SearchMessage::Better(BetterPlan { plan, finding })) => {
+                NextPlan::Better(BetterPlan {
+                    plan: self.to_caller_facts(&plan),
+                    finding,
+                })
+            }
             Ok(SearchMessage::Ended(mut answer)) => {
                 if let Ok(PlanOutcome { plan, .. }) = &mut *answer {
                     *plan = plan.take().map(|plan| self.to_caller_facts(&plan));

@@ -4,7 +4,7 @@ use elbowroom_model::{Situation, Task};
 use elbowroom_planner::{Counts, Proof};
 use elbowroom_verify::no_plan::NoPlan;
 
-use super::{SearchMonitor, PlanAnswer, PlanFinding, PlanStop};
+use super::{PlanAnswer, PlanFinding, PlanStop, SearchMonitor};
 use crate::execute::WITHOUT_SELF_OVERLAP;
 use crate::no_plan::{Effort, fluents_without_value, no_plan_certificate_within};
 
@@ -22,7 +22,11 @@ impl SearchMonitor<'_> {
         let evaluated = counts.evaluated;
         let ended = format!("the search ended without one, after {evaluated} states");
         if !matches!(proof, Proof::WithoutSelfOverlap { .. }) {
-            return self.claimed_finding(task, proof.to_string(), &format!("no plan found: {ended}"));
+            return self.claimed_finding(
+                task,
+                proof.to_string(),
+                &format!("no plan found: {ended}"),
+            );
         }
         let proved = format!("{proof}; the certificate covers self-overlap as well");
         let unproved = format!("{WITHOUT_SELF_OVERLAP}: {ended}");

@@ -13,12 +13,12 @@ use elbowroom_planner::{Answer, Settings};
 use elbowroom_sim::WorldModel;
 use serde::{Deserialize, Serialize};
 
-use super::{SearchMonitor, PlanFinding, PlanOutcome, PlanStop, no_plan_reason};
-use crate::answers::{Event, Exact, PlanProgress, RequestError, Observer, exact};
+use super::{PlanFinding, PlanOutcome, PlanStop, SearchMonitor, no_plan_reason};
+use crate::answers::{Event, Exact, Observer, PlanProgress, RequestError, exact};
 use crate::execute::{Candidates, Limits};
-use crate::pipeline;
 use crate::makespan::last_end;
-use evaluation::{PlanEvaluator, EvaluatedPlan};
+use crate::pipeline;
+use evaluation::{EvaluatedPlan, PlanEvaluator};
 
 /// Objective of a plan other than its makespan or metric.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -257,7 +257,10 @@ fn compare_candidates(
         let Some(value) = value else {
             // Interrupted: the first plan is returned with an unknown value, a later one is
             // dropped.
-            best.get_or_insert(EvaluatedPlan::unknown(candidate, "the search was ended before"));
+            best.get_or_insert(EvaluatedPlan::unknown(
+                candidate,
+                "the search was ended before",
+            ));
             break;
         };
         let judged = EvaluatedPlan {

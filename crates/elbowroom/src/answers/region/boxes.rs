@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Share;
 use crate::answers::envelope::{EnvelopeRequest, Search, envelope};
-use crate::answers::{RequestError, Observer, exact};
+use crate::answers::{Observer, RequestError, exact};
 
 /// A box inside the region.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -111,7 +111,11 @@ pub(super) fn measure(
 }
 
 /// Returns the volume; `None` if there is none, or `flow` breaks.
-fn size_of(body: &BoundedRegion, seed: u64, flow: &mut dyn FnMut() -> ControlFlow<()>) -> Option<Size> {
+fn size_of(
+    body: &BoundedRegion,
+    seed: u64,
+    flow: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Option<Size> {
     let mut pieces = Vec::new();
     for (index, components) in body.pieces.iter().enumerate() {
         let mut product = Size::Exact(Rational::ONE);

@@ -131,7 +131,8 @@ impl Walk {
             for _ in 0..count {
                 let at = self.random_below(count);
                 let limit = outer * half[at];
-                let (mut lower, mut upper) = (-limit - self.position[at], limit - self.position[at]);
+                let (mut lower, mut upper) =
+                    (-limit - self.position[at], limit - self.position[at]);
                 for (row, factor) in &self.rows.of[at] {
                     let reach = self.rows.slack[*row] / factor;
                     if *factor > 0.0 {

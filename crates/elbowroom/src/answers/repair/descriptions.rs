@@ -59,7 +59,9 @@ impl Subject {
         let mut words: Vec<String> = Vec::new();
         for hindrance in hindrances {
             let own = match hindrance {
-                BindingConstraint::Requirement(requirement) => Some(self.describe_missing(requirement)),
+                BindingConstraint::Requirement(requirement) => {
+                    Some(self.describe_missing(requirement))
+                }
                 other => self.hindrance(other),
             };
             if let Some(own) = own.filter(|own| !words.contains(own)) {

@@ -126,9 +126,10 @@ impl Scarcity {
         let mut draws: Vec<Rational> = (0..SAMPLES).map(draw).collect();
         draws.sort();
         match operator {
-            UpdateOperator::Decrease | UpdateOperator::ScaleDown => {
-                draws[quantile_index(self.quantile)].clone().max(planned.clone())
-            }
+            UpdateOperator::Decrease | UpdateOperator::ScaleDown => draws
+                [quantile_index(self.quantile)]
+            .clone()
+            .max(planned.clone()),
             UpdateOperator::Increase | UpdateOperator::ScaleUp | UpdateOperator::Assign => {
                 let few = &draws[quantile_index(100 - self.quantile.min(100))];
                 few.clone().min(planned.clone())

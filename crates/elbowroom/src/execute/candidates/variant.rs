@@ -255,7 +255,9 @@ fn count_failures(task: &Task, problem: &mut Problem, world: &WorldModel) {
     };
     for schema in (0..problem.schemas.len()).map(SchemaId::from) {
         let value = add_function_of(task, schema, "odds", problem, &|name, _| {
-            let fails = world.failure_rule(name).map_or(0.0, |rule| rule.probability);
+            let fails = world
+                .failure_rule(name)
+                .map_or(0.0, |rule| rule.probability);
             // An action that always fails gets a large finite cost.
             let against = -(1.0 - fails.min(0.999_999)).ln();
             Some(Rational::new(to_millionths(against), 1_000_000))

@@ -3,17 +3,18 @@
 use std::collections::BTreeMap;
 
 use elbowroom_execution::executors::OrderCache;
-use elbowroom_execution::run::{MidExecutionStart, EntryPoint, Ports, Run, RunSettings, Verdict};
+use elbowroom_execution::run::{EntryPoint, MidExecutionStart, Ports, Run, RunSettings, Verdict};
 use elbowroom_execution::{
-    Cause, Decided, Decision, Executor, PreparedPlan, DecisionContext, PlanForm, PlanEvent, NoRecord, PlanAnswer, Planner,
-    PlannerAnswer, PortWorkers, Preparer, BeliefState, Reason, DecisionPoint,
+    BeliefState, Cause, Decided, Decision, DecisionContext, DecisionPoint, Executor, NoRecord,
+    PlanAnswer, PlanEvent, PlanForm, Planner, PlannerAnswer, PortWorkers, PreparedPlan, Preparer,
+    Reason,
 };
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 use elbowroom_sim::ObservedChanges;
 
 use super::super::rollouts::{BudgetedPlanner, Rollouts};
-use super::{RolloutPolicy, SEED, Alternative};
+use super::{Alternative, RolloutPolicy, SEED};
 
 /// Shared data of all samples of one scene.
 pub(super) struct SampleSet {
@@ -61,7 +62,11 @@ impl SampleSet {
                 let waiting = going_on.map(|inner| {
                     let until = until.clone();
                     let news = Vec::new();
-                    Box::new(WaitingExecutor { until, pending_events: news, inner }) as Box<dyn Executor>
+                    Box::new(WaitingExecutor {
+                        until,
+                        pending_events: news,
+                        inner,
+                    }) as Box<dyn Executor>
                 });
                 (waiting, EntryPoint::Continue, None)
             }

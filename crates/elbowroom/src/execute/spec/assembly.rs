@@ -6,7 +6,9 @@ use std::time::Duration;
 use elbowroom_envelope::Objective;
 use elbowroom_execution::executors::ExecutorSpec;
 use elbowroom_execution::run::PlanningTime;
-use elbowroom_execution::{PlanForm, NoPlanner, PlanComparator, ActionValues, Planner, PrepareError, Preparer, World};
+use elbowroom_execution::{
+    ActionValues, NoPlanner, PlanComparator, PlanForm, Planner, PrepareError, Preparer, World,
+};
 use elbowroom_external::{self as external, PlannerError};
 use elbowroom_model::problem::Problem;
 use elbowroom_model::{Task, TimeTriggeredPlan};
@@ -19,11 +21,12 @@ use elbowroom_text::Diagnostics;
 use super::{EMBEDDED, NO_PLANNER, RunSpec};
 use crate::answers::envelope::unknown_action;
 use crate::execute::{
-    ActionSets, PlanPreparer, PlanSelector, SelectingPlanner, Embedded, Execution, External, FirstPlan, WorldKnowledge,
-    MostProbablePlanner, RolloutPolicy, Replanning, Rollouts, SharedRolloutPolicy, AdversarialWorld, planning_work,
+    ActionSets, AdversarialWorld, Embedded, Execution, External, FirstPlan, MostProbablePlanner,
+    PlanPreparer, PlanSelector, Replanning, RolloutPolicy, Rollouts, SelectingPlanner,
+    SharedRolloutPolicy, WorldKnowledge, planning_work,
 };
 use crate::timed::{Policy, Settings};
-use crate::{BoxTextError, DistributionError, pipeline, parse_box};
+use crate::{BoxTextError, DistributionError, parse_box, pipeline};
 
 /// The time limit of another planner for its first plan.
 const FIRST_PLAN_TIME_LIMIT: Duration = Duration::from_secs(60);
@@ -229,12 +232,17 @@ impl RunSpec {
         }
         let likelihoods = self.likelihoods(task)?;
         if let Some(world) = model.filter(|_| self.believed_world().is_some()) {
-            return Ok(Some(WorldKnowledge::World(self.rollouts(world, likelihoods))));
+            return Ok(Some(WorldKnowledge::World(
+                self.rollouts(world, likelihoods),
+            )));
         }
-        Ok(self.likelihoods.is_some().then(|| WorldKnowledge::Likelihoods {
-            reorders: self.executor.chooses_order(),
-            likelihoods,
-        }))
+        Ok(self
+            .likelihoods
+            .is_some()
+            .then(|| WorldKnowledge::Likelihoods {
+                reorders: self.executor.chooses_order(),
+                likelihoods,
+            }))
     }
 
     /// Returns the settings of rollouts of this run in samples of its world.
@@ -290,7 +298,11 @@ impl RunSpec {
         let own = match name {
             name if name.eq_ignore_ascii_case(EMBEDDED) => PlannerChoice::Embedded,
             name if name.eq_ignore_ascii_case(NO_PLANNER) => PlannerChoice::Disabled,
-            name => return Ok(PlannerChoice::External(Box::new(external::Planner::named(name)?))),
+            name => {
+                return Ok(PlannerChoice::External(Box::new(external::Planner::named(
+                    name,
+                )?)));
+            }
         };
         match self.planner_time {
             Some(_) => Err(SpecError::NoTimeLimit(name.clone())),
@@ -326,7 +338,9 @@ impl RunSpec {
                 _ if self.is_persistent => Some(FirstPlanError::Persistent),
                 PlannerChoice::Embedded if is_known => None,
                 PlannerChoice::Embedded => Some(FirstPlanError::NoWorldKnowledge),
-                PlannerChoice::Disabled | PlannerChoice::External(_) => Some(FirstPlanError::ExternalPlanner),
+                PlannerChoice::Disabled | PlannerChoice::External(_) => {
+                    Some(FirstPlanError::ExternalPlanner)
+                }
             };
             if let Some(wrong) = wrong {
                 return Err(SpecError::FirstPlan(wrong));
@@ -431,7 +445,8 @@ impl RunSpec {
         };
         let odds = model.map(|model| {
             let time = self.expected_planning_time();
-            Box::new(MostProbablePlanner::new(model, self.embedded(), time)) as Box<dyn PlanComparator>
+            Box::new(MostProbablePlanner::new(model, self.embedded(), time))
+                as Box<dyn PlanComparator>
         });
         Ok(Execution::of(task)
             .by(self.executor.clone())

@@ -10,7 +10,10 @@ use elbowroom_sim::WorldModel;
 use super::formula::Formula;
 use super::{PrismError, bare, checked};
 use crate::export::names::distinct;
-use crate::timed::{ActionModel, CellProbabilities, Event, Facts, Needs, Settings, Side, TimedWorld, cell_probabilities_of};
+use crate::timed::{
+    ActionModel, CellProbabilities, Event, Facts, Needs, Settings, Side, TimedWorld,
+    cell_probabilities_of,
+};
 
 /// Direction of the bound on the best value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,8 +53,9 @@ pub fn timed(
     if !world.numbers.is_empty() {
         return Err(PrismError::Numbers);
     }
-    let has_outcomes =
-        |act: &ActionModel| act.failures.len() > 1 || act.failures.iter().any(|way| way.delay > 0.0);
+    let has_outcomes = |act: &ActionModel| {
+        act.failures.len() > 1 || act.failures.iter().any(|way| way.delay > 0.0)
+    };
     if world.acts.iter().any(has_outcomes) {
         return Err(PrismError::Outcomes);
     }

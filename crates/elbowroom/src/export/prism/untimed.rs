@@ -8,7 +8,7 @@ use elbowroom_model::ground::{Action, Body, Change, Condition, FactId, SnapActio
 use elbowroom_model::{State, Task};
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, PartialOrderPlan};
-use elbowroom_probability::optimum::{DeadEnds, Horizon, TabulationError, Perturbed, Settings};
+use elbowroom_probability::optimum::{DeadEnds, Horizon, Perturbed, Settings, TabulationError};
 use elbowroom_probability::{Likelihoods, Model, Semantics, all_actions_under};
 
 use super::formula::{Formula, choice, exact};

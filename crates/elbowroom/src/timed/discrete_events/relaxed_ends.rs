@@ -9,12 +9,12 @@ use indexmap::IndexMap;
 
 use super::postponement::may_be_better_later;
 use crate::timed::Side;
-use crate::timed::upper_bound::{Cell, Moment};
 use crate::timed::action_model::ActionModel;
 use crate::timed::cell_probabilities::CellProbabilities;
 use crate::timed::failures::Ending;
 use crate::timed::graph::{Choice, Target};
 use crate::timed::state::{Phase, State};
+use crate::timed::upper_bound::{Cell, Moment};
 use crate::timed::world::{Facts, TimedWorld};
 
 /// Cache of [`may_be_better_later`], by facts, running actions, past events, and the end.
@@ -81,7 +81,8 @@ impl Cell<'_> {
         let for_nothing = startable.iter().find(|act| {
             let act = &world.acts[**act];
             let rest = act.rest.as_ref();
-            act.start.does_nothing() && rest.is_some_and(|(over_all, _)| over_all.holds(state.facts))
+            act.start.does_nothing()
+                && rest.is_some_and(|(over_all, _)| over_all.holds(state.facts))
         });
         if let Some(act) = for_nothing {
             return Some(vec![self.start(state, *coming, *act)]);
@@ -105,7 +106,11 @@ impl Cell<'_> {
 
     /// Returns the choices to restart a running action, or to start an action of the same class
     /// instead. There is no other use of cancelling, because actions need not end.
-    pub(in crate::timed) fn restart_choices(&mut self, moment: &Moment, place: usize) -> Vec<Choice> {
+    pub(in crate::timed) fn restart_choices(
+        &mut self,
+        moment: &Moment,
+        place: usize,
+    ) -> Vec<Choice> {
         let bound = self.bound;
         let world = bound.world;
         let (state, coming) = moment;

@@ -2,12 +2,14 @@
 //! in the order of their examination.
 
 use super::cells;
-use crate::timed::upper_bound::UpperBound;
-use crate::timed::lower_bound::{LowerBound, DecisionEpochs};
 use crate::timed::cell_probabilities::CellProbabilities;
+use crate::timed::lower_bound::{DecisionEpochs, LowerBound};
 use crate::timed::restricted_policy::fitting;
+use crate::timed::upper_bound::UpperBound;
 use crate::timed::world::TimedWorld;
-use crate::timed::{Grid, NotTabulated, ROUNDING_MARGIN, Settings, Side, Stop, cell_probabilities, graph, step};
+use crate::timed::{
+    Grid, NotTabulated, ROUNDING_MARGIN, Settings, Side, Stop, cell_probabilities, graph, step,
+};
 
 /// The bounds found.
 pub(in crate::timed) struct FoundBounds {
@@ -191,7 +193,9 @@ impl Search<'_> {
         let leaner = freer.without_certainties(&chances);
         let worlds = leaner.into_iter().chain([freer, above]);
         let wanted = Some(self.settings.first_cells.max(1));
-        Ok(worlds.map(|world| UpperCandidate { world, wanted }).collect())
+        Ok(worlds
+            .map(|world| UpperCandidate { world, wanted })
+            .collect())
     }
 
     fn compute_lower_bound(
@@ -234,7 +238,11 @@ impl Search<'_> {
         };
         let mut left = most_states;
         let chances = CellProbabilities::new(world, step, cells + 1, Side::Above)?;
-        let value = graph::value(&UpperBound::at_known_times(world, &chances), &mut left, self.may_continue);
+        let value = graph::value(
+            &UpperBound::at_known_times(world, &chances),
+            &mut left,
+            self.may_continue,
+        );
         self.found.grid.states += most_states - left;
         match value {
             Ok(value) => self.found.grid.upper = self.found.grid.upper.min(value + ROUNDING_MARGIN),

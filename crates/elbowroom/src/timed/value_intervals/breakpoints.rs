@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 
 use elbowroom_sim::Side as Part;
 
-use super::{Amount, ChangeValue, ChangeOperator, INFINITE, Span, UNIT};
+use super::{Amount, ChangeOperator, ChangeValue, INFINITE, Span, UNIT};
 use crate::timed::action_model::{ActionModel, Snap};
 use crate::timed::world::{Facts, unknown_shape};
 use crate::timed::{NotTabulated, TimedWorld};
@@ -57,7 +57,10 @@ impl TimedWorld {
 
     /// Returns the changes of a number by actions that do not reach the goal.
     fn amounts_before_goal(&self, number: usize) -> impl Iterator<Item = &Amount> {
-        let acts = self.acts.iter().filter(|act| !act.achieves_goal(&self.goal));
+        let acts = self
+            .acts
+            .iter()
+            .filter(|act| !act.achieves_goal(&self.goal));
         let snaps = acts.flat_map(|act| {
             let end = act.rest.iter().map(|(_, end)| end);
             std::iter::once(&act.start).chain(end)
@@ -154,13 +157,16 @@ impl TimedWorld {
                     ChangeOperator::Set => true,
                     change => (change == one && value >= 0) || (change == other && value <= 0),
                 },
-                ChangeValue::Random { .. } => amount.change == one && self.is_never_negative(amount),
+                ChangeValue::Random { .. } => {
+                    amount.change == one && self.is_never_negative(amount)
+                }
             })
         };
         let only_falls = only(ChangeOperator::Subtract, ChangeOperator::Add);
         // A number that only rises is never below all known values, and one that only falls never
         // above.
-        if let Some(lowest) = lowest.filter(|_| only(ChangeOperator::Add, ChangeOperator::Subtract)) {
+        if let Some(lowest) = lowest.filter(|_| only(ChangeOperator::Add, ChangeOperator::Subtract))
+        {
             edges.insert(lowest - 1);
         }
         for sum in sums {
@@ -211,7 +217,12 @@ impl TimedWorld {
         };
         #[allow(clippy::cast_precision_loss, reason = "far below 2^52")]
         let value = value as f64 / UNIT as f64;
-        rule.probability_of_side(value, Part::AtMost, *planned, self.model.resolution.to_f64())
+        rule.probability_of_side(
+            value,
+            Part::AtMost,
+            *planned,
+            self.model.resolution.to_f64(),
+        )
     }
 
     /// Returns `true` if a random amount may be larger than `value`, and may be smaller.

@@ -3,7 +3,7 @@
 use elbowroom::execute::{Embedded, Execution};
 use elbowroom::execution::run::Verdict;
 use elbowroom::execution::{
-    Event, Observation, PlanAnswer, Planner, PlannerAnswer, Request, ActionHandle,
+    ActionHandle, Event, Observation, PlanAnswer, Planner, PlannerAnswer, Request,
 };
 use elbowroom::model::{Situation, Task};
 use elbowroom::num::Rational;

@@ -141,7 +141,11 @@ fn many_goals_are_reached_in_parts() {
             pursue(&format!("g{i}"), &format!("(at {})", names[i % 2])),
         )
     };
-    let told = run(&task_with_rooms("(at lab)"), 200, (0..12).map(goal).collect());
+    let told = run(
+        &task_with_rooms("(at lab)"),
+        200,
+        (0..12).map(goal).collect(),
+    );
     let achieved = told.notes.iter().filter(|it| it.ends_with("achieved"));
     assert_eq!(achieved.count(), 7, "{:#?}", told.notes);
     assert_has(&told, &["rest: goal-reached g1 g3 g5 g7 g9 g11"]);

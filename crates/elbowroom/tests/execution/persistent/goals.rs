@@ -9,7 +9,9 @@ use elbowroom::model::{Situation, Task};
 use elbowroom::num::Rational;
 use std::sync::{Arc, PoisonError};
 
-use super::scripted::{Notes, ScriptedWorld, abandon, assert_has, has, pursue, run, scripted, task};
+use super::scripted::{
+    Notes, ScriptedWorld, abandon, assert_has, has, pursue, run, scripted, task,
+};
 
 #[test]
 fn run_is_idle_after_reaching_its_goal() {

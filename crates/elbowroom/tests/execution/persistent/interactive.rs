@@ -4,7 +4,7 @@ use elbowroom::execution::run::Verdict;
 use elbowroom::execution::{Event, Request};
 use elbowroom::num::Rational;
 
-use super::scripted::{abandon, assert_has, run_interactive, has, pursue, task};
+use super::scripted::{abandon, assert_has, has, pursue, run_interactive, task};
 
 #[test]
 fn interactive_run_ends_with_its_goal_and_rejects_others() {

@@ -6,14 +6,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use elbowroom::execute::Execution;
 use elbowroom::execution::run::{RunPhase, RunSettings, RunSnapshot};
-use elbowroom::execution::{Ending, Entry, Event, Observation, Recorder, Request, ActionHandle};
+use elbowroom::execution::{ActionHandle, Ending, Entry, Event, Observation, Recorder, Request};
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
 use elbowroom::report::trace::{
     Line, Replay, ReplayPlanner, ReplayWorld, SnapshotLine, Stored, snapshot_text,
 };
 
-use super::scripted::{RandomNumbers, ScriptedWorld, SlowPlanner, abandon, fact, pursue, pursue_from, task};
+use super::scripted::{
+    RandomNumbers, ScriptedWorld, SlowPlanner, abandon, fact, pursue, pursue_from, task,
+};
 
 /// Recorder of a run's lines, and of the possible rotations: the number of lines before each, and
 /// its snapshot.
@@ -263,7 +265,9 @@ fn snapshot_of_another_problem_is_rejected() {
     let other = snapshot.replacen("(power)", "(steam)", 1);
     let stored = read(&other).expect("it can be read");
     let line = stored.snapshot().expect("a snapshot").expect("there");
-    let error = line.to_run_snapshot(&example_task()).expect_err("there is no such fact");
+    let error = line
+        .to_run_snapshot(&example_task())
+        .expect_err("there is no such fact");
     assert!(error.contains("no fact `(steam)`"), "{error}");
     let other = read(&snapshot.replacen("\"now\"", "\"then\"", 1)).expect("it can be read");
     assert_eq!(other.snapshot().expect_err("it has no time").line, 2);

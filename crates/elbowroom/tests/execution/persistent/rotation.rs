@@ -4,9 +4,9 @@
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 
-use elbowroom::execute::{PlanPreparer, Execution};
+use elbowroom::execute::{Execution, PlanPreparer};
 use elbowroom::execution::run::{RunPhase, RunSettings, RunSnapshot};
-use elbowroom::execution::{Ending, Entry, Event, Recorder, Request, ActionHandle};
+use elbowroom::execution::{ActionHandle, Ending, Entry, Event, Recorder, Request};
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
 use elbowroom::pddl::{self, Source};
@@ -15,7 +15,9 @@ use elbowroom::report::trace::{
 };
 
 use super::scripted::{RandomNumbers, SlowPlanner, abandon, fact, pursue};
-use crate::background_planner::{ScriptedBackgroundPlanner, ScriptedBackgroundPreparer, announcing_world};
+use crate::background_planner::{
+    ScriptedBackgroundPlanner, ScriptedBackgroundPreparer, announcing_world,
+};
 use crate::scene::irr;
 
 const HEADER: &str = r#"{"event":"header","format":"elbowroom-trace","version":1}"#;
@@ -177,7 +179,8 @@ impl Case {
             .rev()
             .map(|length| length / &Rational::from(2));
         let readying: Vec<Rational> = readying.collect();
-        let planner = ScriptedBackgroundPlanner::with_planning_times(&lengths).with_preparation_times(&readying);
+        let planner = ScriptedBackgroundPlanner::with_planning_times(&lengths)
+            .with_preparation_times(&readying);
         let (mut world, is_to_end) = announcing_world((300, script), &planner, &quarters);
         let segments = Arc::new(Mutex::new(vec![Segment::default()]));
         let recorder = Rotating {
@@ -342,7 +345,10 @@ fn mismatched_snapshot_is_rejected() {
         assert!(busy.contains(from), "{busy}");
         let stored = Stored::read(&format!("{HEADER}\n{}\n", busy.replace(from, to)));
         let error = match stored.expect("a trace").snapshot() {
-            Ok(line) => line.expect("there").to_run_snapshot(&case.task()).expect_err(from),
+            Ok(line) => line
+                .expect("there")
+                .to_run_snapshot(&case.task())
+                .expect_err(from),
             Err(error) => error.to_string(),
         };
         assert!(error.contains(why), "{error}");

@@ -3,8 +3,8 @@
 use elbowroom::execute::{Embedded, Execution};
 use elbowroom::execution::run::{Report, RunSettings, Verdict};
 use elbowroom::execution::{
-    Command, Ending, Entry, Event, GoalChange, GoalTerms, Observation, TimeAdvance, Planner,
-    PlannerAnswer, Recorder, Request, World, WorldError,
+    Command, Ending, Entry, Event, GoalChange, GoalTerms, Observation, Planner, PlannerAnswer,
+    Recorder, Request, TimeAdvance, World, WorldError,
 };
 use elbowroom::model::{Situation, Task};
 use elbowroom::num::Rational;
@@ -213,7 +213,11 @@ pub(super) struct RunResult {
 }
 
 /// Makes a persistent run with that script until `end`.
-pub(super) fn run(task: &Arc<Task>, end: i64, script: Vec<(impl Into<Rational>, Event)>) -> RunResult {
+pub(super) fn run(
+    task: &Arc<Task>,
+    end: i64,
+    script: Vec<(impl Into<Rational>, Event)>,
+) -> RunResult {
     scripted(task, end, script, |execution| execution.persistent(true))
 }
 

@@ -144,7 +144,11 @@ impl FluentHistory {
     ///
     /// Every change of a fluent interferes with its assignments. So all changes before a past
     /// assignment are past, and all changes after a future assignment are in the future.
-    pub(super) fn relevant_part(&self, around: &mut Around<'_>, open: &mut BTreeSet<NodeId>) -> Self {
+    pub(super) fn relevant_part(
+        &self,
+        around: &mut Around<'_>,
+        open: &mut BTreeSet<NodeId>,
+    ) -> Self {
         let here = self
             .events
             .partition_point(|(node, _)| around.is_not_after_start(*node));

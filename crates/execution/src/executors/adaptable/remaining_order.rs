@@ -11,16 +11,18 @@ use elbowroom_model::{Footprint, State, Step};
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node, NodeId};
 use elbowroom_probability::search::Progress;
-use elbowroom_probability::{Choice, SearchState, Likelihoods, NextHappening, Running};
+use elbowroom_probability::{Choice, Likelihoods, NextHappening, Running, SearchState};
 
 use super::super::happening_choice::HappeningChooser;
 use super::initial_belief::InitialBelief;
 use super::repetitions::Repetitions;
+use crate::belief_state::BeliefState;
 use crate::dispatch::replan;
 use crate::event::Ending;
-use crate::executor::{Decided, Decision, PreparedPlan, DecisionContext, PlanEvent, Order, Planned, StepId};
-use crate::belief_state::BeliefState;
-use crate::reason::{Subject, Evidence, Cause, Reason};
+use crate::executor::{
+    Decided, Decision, DecisionContext, Order, PlanEvent, Planned, PreparedPlan, StepId,
+};
+use crate::reason::{Cause, Evidence, Reason, Subject};
 use crate::separation::Separation;
 
 /// Work limit of a search, in happenings: the number of sequences times the plan's length. When it
@@ -212,8 +214,8 @@ impl RemainingOrder {
                 *failures += 1;
                 let failures = *failures;
                 let step = &self.steps[instance.index()];
-                let is_explained =
-                    failures <= MAX_EXPLAINED_FAILURES && has_unmet_condition(step, start.is_some(), belief);
+                let is_explained = failures <= MAX_EXPLAINED_FAILURES
+                    && has_unmet_condition(step, start.is_some(), belief);
                 if is_explained {
                     return None;
                 }
@@ -224,10 +226,14 @@ impl RemainingOrder {
                 self.record_spontaneous_change(news, moment);
                 None
             }
-            PlanEvent::Contradiction { action } => Some(Reason::new(Cause::Contradiction).for_action(action)),
-            PlanEvent::TimedOut { action, since } => {
-                Some(Reason::new(Cause::Silence).for_action(action).since(since.clone()))
+            PlanEvent::Contradiction { action } => {
+                Some(Reason::new(Cause::Contradiction).for_action(action))
             }
+            PlanEvent::TimedOut { action, since } => Some(
+                Reason::new(Cause::Silence)
+                    .for_action(action)
+                    .since(since.clone()),
+            ),
         }
     }
 
@@ -320,7 +326,11 @@ impl RemainingOrder {
     }
 
     /// Returns the decision at this moment.
-    pub(super) fn next(&mut self, moment: &DecisionContext<'_>, initial: &InitialBelief) -> Decided {
+    pub(super) fn next(
+        &mut self,
+        moment: &DecisionContext<'_>,
+        initial: &InitialBelief,
+    ) -> Decided {
         if !self.cancelled.is_empty() {
             return wait(None, Subject::EndOfCancelledActions);
         }
@@ -391,14 +401,16 @@ impl RemainingOrder {
             choice = self.chooser.choose(&circumstances, &mut most);
         }
         match choice {
-            Err(coupled) => {
-                replan(Reason::new(Cause::NoOrder).about(Subject::ExternalMessage(coupled.to_string())))
-            }
+            Err(coupled) => replan(
+                Reason::new(Cause::NoOrder).about(Subject::ExternalMessage(coupled.to_string())),
+            ),
             Ok(Choice::GoalReached) => Decided {
                 decision: Decision::GoalReached,
                 reason: Reason::new(Cause::GoalReached),
             },
-            Ok(Choice::Next(next)) => self.decide_next_happening(&next, moment, &now, (&state, &running)),
+            Ok(Choice::Next(next)) => {
+                self.decide_next_happening(&next, moment, &now, (&state, &running))
+            }
             Ok(Choice::Replan) if self.awaits_ends(&now) => {
                 // Running actions are awaited before the plan is abandoned: a robot whose move is
                 // cancelled is at neither place, and an end may make another order possible.
@@ -578,7 +590,8 @@ fn check_failures(
 ) -> Option<Reason> {
     let action = &step.action;
     let seconds = step.duration.as_ref().map_or(0.0, Rational::to_f64);
-    let success = likelihoods.start(action).unwrap_or(1.0) * likelihoods.success_probability(action, seconds);
+    let success =
+        likelihoods.start(action).unwrap_or(1.0) * likelihoods.success_probability(action, seconds);
     if (1.0 - success).powi(failures) >= MIN_FAILURE_PROBABILITY && failures < MAX_FAILURES {
         return None;
     }
@@ -590,7 +603,11 @@ fn check_failures(
         failures,
         success,
     };
-    Some(Reason::new(Cause::Failed).for_action(&action.name).about(about))
+    Some(
+        Reason::new(Cause::Failed)
+            .for_action(&action.name)
+            .about(about),
+    )
 }
 
 /// Returns `true` if a condition of the action is known not to hold, which explains its failure.

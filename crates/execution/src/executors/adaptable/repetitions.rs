@@ -46,7 +46,8 @@ impl Repetitions {
         running: &[InstanceId],
         instance: InstanceId,
     ) {
-        self.started.insert(step, repetition_key(state, running, instance));
+        self.started
+            .insert(step, repetition_key(state, running, instance));
     }
 
     /// Records the end of an action.

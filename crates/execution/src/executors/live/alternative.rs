@@ -27,7 +27,11 @@ impl ExecutedPlan {
     }
 
     fn slack(&self, now: &Rational) -> Rational {
-        guarantee_status::slack_of_remaining_plan(&self.dispatch, (&self.prepared_plan, &self.values), now)
+        guarantee_status::slack_of_remaining_plan(
+            &self.dispatch,
+            (&self.prepared_plan, &self.values),
+            now,
+        )
     }
 
     fn has_actions_to_begin(&self) -> bool {

@@ -14,8 +14,8 @@ use elbowroom_stn::ConsistentNetwork;
 
 use super::ExecutedPlan;
 use crate::executor::DecisionContext;
-use crate::preparation::RegionOracle;
 use crate::measured_amounts::{amount_expression, amount_locations};
+use crate::preparation::RegionOracle;
 use crate::reason::{GuaranteeLevel, Reason};
 
 /// The box of the remaining plan, and the observations compared with it.
@@ -126,7 +126,8 @@ impl ExecutedPlan {
             self.values[parameter] = duration;
         } else {
             let is_running = self.dispatch.running().contains(&instance);
-            self.box_membership.set_due(instance, due.filter(|_| is_running));
+            self.box_membership
+                .set_due(instance, due.filter(|_| is_running));
         }
     }
 

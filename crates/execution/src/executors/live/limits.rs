@@ -7,7 +7,7 @@ use elbowroom_plan::{InstanceId, ParametrizedPlan, Valuation};
 use super::{ExecutedPlan, parameter_bounds};
 use crate::executor::{Decided, Decision};
 use crate::preparation::RegionOracle;
-use crate::reason::{Subject, Cause, Reason};
+use crate::reason::{Cause, Reason, Subject};
 
 impl ExecutedPlan {
     /// Computes how long each running action may take, as far as numbers depend on it.
@@ -46,7 +46,12 @@ impl ExecutedPlan {
         let mut does = region.growing(&self.prepared_plan.task, plan, values, parameter);
         let least = &values[parameter];
         let (_, most) = parameter_bounds(&self.prepared_plan.plan, parameter);
-        let limit = greatest_duration(least, most.as_ref(), self.prepared_plan.task.epsilon(), &mut does);
+        let limit = greatest_duration(
+            least,
+            most.as_ref(),
+            self.prepared_plan.task.epsilon(),
+            &mut does,
+        );
         drop(does);
         self.limits.insert(instance, limit);
     }
@@ -86,7 +91,8 @@ impl ExecutedPlan {
             return decided;
         };
         let next_due = self.next_due();
-        let due = next_due.map(|(time, _)| self.dispatch.to_world_time(time) + self.prepared_plan.task.epsilon());
+        let due = next_due
+            .map(|(time, _)| self.dispatch.to_world_time(time) + self.prepared_plan.task.epsilon());
         let until = self
             .time_after_first_limit()
             .into_iter()

@@ -9,9 +9,9 @@ use std::collections::BTreeMap;
 use elbowroom_model::{Step, TimeTriggeredPlan};
 use elbowroom_plan::{InstanceId, Node, ParameterKind};
 
-use super::without_guarantee::{UnguaranteedPlan, ReductionClass};
+use super::without_guarantee::{ReductionClass, UnguaranteedPlan};
 use super::{ExecutedPlan, guarantee_status};
-use crate::executor::{PreparedPlan, PlanEvent, StepId};
+use crate::executor::{PlanEvent, PreparedPlan, StepId};
 use crate::preparation::RegionOracle;
 use crate::reason::Reason;
 
@@ -88,7 +88,8 @@ impl ExecutedPlan {
         region: &mut dyn RegionOracle,
     ) -> Option<(Self, UnguaranteedPlan)> {
         let mut rest = Self::new(&with_planned_times(mission), region).ok()?;
-        let carried_on = rest.continue_by_orderings(ReductionClass::AtMostHalf, &mission.now, region)?;
+        let carried_on =
+            rest.continue_by_orderings(ReductionClass::AtMostHalf, &mission.now, region)?;
         Some((rest, carried_on))
     }
 }

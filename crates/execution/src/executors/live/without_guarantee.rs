@@ -7,9 +7,9 @@ use elbowroom_stn::ConsistentNetwork;
 
 use super::{ExecutedPlan, esterel, guarantee_status};
 use crate::dispatch::replan;
-use crate::executor::{Decided, Decision, Executor, DecisionContext, PlanEvent};
+use crate::executor::{Decided, Decision, DecisionContext, Executor, PlanEvent};
 use crate::preparation::RegionOracle;
-use crate::reason::{Subject, Cause, GuaranteeLevel, Reason};
+use crate::reason::{Cause, GuaranteeLevel, Reason, Subject};
 
 /// Class of the reduction of durations that the remaining plan needs to end in time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -110,13 +110,26 @@ impl ExecutedPlan {
         first.unwrap_or_default()
     }
 
-    fn schedules_with_reduction(&self, hope: ReductionClass, now: &Rational) -> Option<ConsistentNetwork> {
-        guarantee_status::schedules_if_faster(&self.dispatch, &self.values, &hope.least_duration_share(), now)
+    fn schedules_with_reduction(
+        &self,
+        hope: ReductionClass,
+        now: &Rational,
+    ) -> Option<ConsistentNetwork> {
+        guarantee_status::schedules_if_faster(
+            &self.dispatch,
+            &self.values,
+            &hope.least_duration_share(),
+            now,
+        )
     }
 
     /// Returns the time until which there is this much hope if no action ends before; `Err` if
     /// there is less.
-    fn reduction_valid_until(&self, hope: ReductionClass, now: &Rational) -> Result<Option<Rational>, ()> {
+    fn reduction_valid_until(
+        &self,
+        hope: ReductionClass,
+        now: &Rational,
+    ) -> Result<Option<Rational>, ()> {
         let times = self.schedules_with_reduction(hope, now).ok_or(())?;
         let running = self.dispatch.running().iter();
         let ends = running.filter_map(|it| self.dispatch.latest_end_in_network(&times, *it));
@@ -180,7 +193,9 @@ impl ExecutedPlan {
             return replan(reason);
         }
         if carried_on.may_be_replaced(moment) {
-            carried_on.pending_news.extend_from_slice(moment.plan_events);
+            carried_on
+                .pending_news
+                .extend_from_slice(moment.plan_events);
             return Decided {
                 decision: Decision::Wait {
                     until: Some(now.clone()),

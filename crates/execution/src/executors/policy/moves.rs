@@ -5,11 +5,11 @@ use std::sync::Arc;
 
 use elbowroom_num::Rational;
 
-use super::{MAX_COMMANDS_PER_TIME, CommandedAction, Policy, NextEvaluation};
-use crate::executor::{Decided, Decision, DecisionContext, Order, Planned, StepId};
-use crate::action_values::{Move, ActionValues, DecisionState, RankedMoves};
+use super::{CommandedAction, MAX_COMMANDS_PER_TIME, NextEvaluation, Policy};
+use crate::action_values::{ActionValues, DecisionState, Move, RankedMoves};
 use crate::belief_state::BeliefState;
-use crate::reason::{Subject, Cause, Reason};
+use crate::executor::{Decided, Decision, DecisionContext, Order, Planned, StepId};
+use crate::reason::{Cause, Reason, Subject};
 
 impl Policy {
     /// Returns the period for the next evaluation of moves: the present one, if it has just begun.
@@ -113,8 +113,7 @@ impl Policy {
         let Some((choice, value)) = weighed.moves.first() else {
             return self.request_new_plan(now);
         };
-        let is_often =
-            matches!(&self.last_command, Some((time, times)) if time == now && *times >= MAX_COMMANDS_PER_TIME);
+        let is_often = matches!(&self.last_command, Some((time, times)) if time == now && *times >= MAX_COMMANDS_PER_TIME);
         let names = |name: &str| {
             let steps = self
                 .steps

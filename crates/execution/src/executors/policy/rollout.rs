@@ -7,13 +7,15 @@ use elbowroom_model::Step;
 use elbowroom_model::ground::FactId;
 use elbowroom_num::Rational;
 
-use crate::dispatch::replan;
-use crate::event::{Ending, ActionHandle};
-use crate::executor::PlanForm;
-use crate::executor::{Decided, Decision, Executor, PreparedPlan, DecisionContext, PlanEvent, Order, Planned, StepId};
 use crate::belief_state::BeliefState;
-use crate::reason::{Subject, Cause, Reason};
-use crate::rollout::{RolloutEvaluator, RolloutChoice, DecisionPoint, ObservedChange};
+use crate::dispatch::replan;
+use crate::event::{ActionHandle, Ending};
+use crate::executor::PlanForm;
+use crate::executor::{
+    Decided, Decision, DecisionContext, Executor, Order, PlanEvent, Planned, PreparedPlan, StepId,
+};
+use crate::reason::{Cause, Reason, Subject};
+use crate::rollout::{DecisionPoint, ObservedChange, RolloutChoice, RolloutEvaluator};
 
 use super::moves::wait;
 
@@ -112,7 +114,11 @@ impl RolloutExecutor {
     /// Processes the news. Returns them with the step numbers of the present executor.
     fn learn(&mut self, moment: &DecisionContext<'_>) -> Vec<PlanEvent> {
         self.record_changes(moment);
-        if moment.plan_events.iter().any(|news| self.is_informative(news)) {
+        if moment
+            .plan_events
+            .iter()
+            .any(|news| self.is_informative(news))
+        {
             self.is_result_unchanged = false;
         }
         let mut told = Vec::with_capacity(moment.plan_events.len());
@@ -147,9 +153,10 @@ impl RolloutExecutor {
             PlanEvent::Ended { step, ending, .. } => {
                 *ending != Ending::Succeeded || of(step).is_none_or(|tells| tells.on_end)
             }
-            PlanEvent::Fact(_) | PlanEvent::Value(_) | PlanEvent::Contradiction { .. } | PlanEvent::TimedOut { .. } => {
-                true
-            }
+            PlanEvent::Fact(_)
+            | PlanEvent::Value(_)
+            | PlanEvent::Contradiction { .. }
+            | PlanEvent::TimedOut { .. } => true,
         }
     }
 
@@ -352,7 +359,10 @@ impl RolloutExecutor {
                 }
             }
             Decision::Wait { until } => {
-                let next = self.last_rollout.as_ref().map(|looked| looked + &self.period);
+                let next = self
+                    .last_rollout
+                    .as_ref()
+                    .map(|looked| looked + &self.period);
                 let next = next.filter(|next| next > now && !self.steps.is_empty());
                 *until = until.take().into_iter().chain(next).min();
             }

@@ -10,13 +10,13 @@ use elbowroom_model::ground::{Action, Body};
 use elbowroom_model::{Footprint, Situation, Step, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
-use super::super::plan_start::{PlanStart, preparation_failure};
 use super::super::persistent::PendingGoalChange;
+use super::super::plan_start::{PlanStart, preparation_failure};
 use super::super::{Run, Stop};
 use super::fitting::StartedPlan;
-use super::{ExecutionDuringSearch, BackgroundSearch, MAX_START_REPORT_WAIT};
-use crate::event::{Measured, ActionHandle};
-use crate::executor::{PreparedPlan, PlanForm, PlanEvent, Order};
+use super::{BackgroundSearch, ExecutionDuringSearch, MAX_START_REPORT_WAIT};
+use crate::event::{ActionHandle, Measured};
+use crate::executor::{Order, PlanEvent, PlanForm, PreparedPlan};
 use crate::preparation::PrepareError;
 use crate::record::Entry;
 use crate::request::RequestId;
@@ -79,7 +79,12 @@ impl BackgroundSearch {
 
 impl Run<'_> {
     /// Begins to prepare a fitted plan.
-    pub(super) fn begin_preparation(&mut self, mut search: BackgroundSearch, fit: StartedPlan, is_fitted: bool) {
+    pub(super) fn begin_preparation(
+        &mut self,
+        mut search: BackgroundSearch,
+        fit: StartedPlan,
+        is_fitted: bool,
+    ) {
         let (plan, situation, running) = fit;
         let request = self.request_preparation(&search.task, &plan, &situation, &running);
         search.preparations += 1;
@@ -129,7 +134,9 @@ impl Run<'_> {
     /// Returns the time of the next decision about the preparation if no event comes before.
     pub(super) fn next_preparation_decision(&self, readying: &BackgroundPreparation) -> Rational {
         match &readying.since {
-            Some(since) => (since + Rational::from(MAX_START_REPORT_WAIT)).max(&self.now + self.task.epsilon()),
+            Some(since) => {
+                (since + Rational::from(MAX_START_REPORT_WAIT)).max(&self.now + self.task.epsilon())
+            }
             None if self.now < readying.situation.time => readying.situation.time.clone(),
             // The preparer reports when it is finished.
             None => self.settings.time_limit.clone(),
@@ -179,7 +186,9 @@ impl Run<'_> {
             self.wait_for_search();
             return Ok(true);
         };
-        if self.has_unreported_start(readying) && self.now < since + Rational::from(MAX_START_REPORT_WAIT) {
+        if self.has_unreported_start(readying)
+            && self.now < since + Rational::from(MAX_START_REPORT_WAIT)
+        {
             if search.is_optional() {
                 self.cancel_search();
                 return Ok(false);
@@ -194,7 +203,8 @@ impl Run<'_> {
 
     /// Returns `true` if an action was started meanwhile and its start has not been reported.
     fn has_unreported_start(&self, readying: &BackgroundPreparation) -> bool {
-        let has_ended = |it: ActionHandle| self.action_log.get(it).is_none_or(|it| it.ended.is_some());
+        let has_ended =
+            |it: ActionHandle| self.action_log.get(it).is_none_or(|it| it.ended.is_some());
         let mut begun = starts_since(readying, self.action_log.started());
         begun.any(|it| !has_ended(it) && !self.belief.running().contains_key(&it))
     }
@@ -221,7 +231,9 @@ impl Run<'_> {
                 if search.is_optional() {
                     return Ok(());
                 }
-                if search.execution != ExecutionDuringSearch::RunningActionsOnly || !begun.is_empty() {
+                if search.execution != ExecutionDuringSearch::RunningActionsOnly
+                    || !begun.is_empty()
+                {
                     return self.search_again(&search.reason);
                 }
                 if !readying.is_fitted {
@@ -235,7 +247,8 @@ impl Run<'_> {
             }
         };
         let steps = self.match_steps(&mission, &begun);
-        let agrees = !readying.is_outdated && !self.has_unreported_start(&readying) && steps.is_some();
+        let agrees =
+            !readying.is_outdated && !self.has_unreported_start(&readying) && steps.is_some();
         if search.is_optional() {
             if !agrees || !self.replaces_present_plan(&mission, &search.reason)? {
                 return Ok(());
@@ -255,7 +268,8 @@ impl Run<'_> {
             });
         } else {
             let took = &self.now - &search.started_at;
-            self.expected_planning_time = std::mem::take(&mut self.expected_planning_time).max(took);
+            self.expected_planning_time =
+                std::mem::take(&mut self.expected_planning_time).max(took);
         }
         self.report_past_events();
         self.plan_task = Some(Arc::clone(&search.task));
@@ -299,7 +313,11 @@ impl Run<'_> {
     }
 
     /// Prepares the remaining plan for other goals.
-    pub(in crate::run) fn prepare_remaining_plan(&mut self, turn: PendingGoalChange, rest: StartedPlan) {
+    pub(in crate::run) fn prepare_remaining_plan(
+        &mut self,
+        turn: PendingGoalChange,
+        rest: StartedPlan,
+    ) {
         let may_go_on = !self.search_results.is_plan_infeasible
             && self.settings.running == super::super::RunningRule::Keep
             && self.ports.executor.need() != PlanForm::PartialOrder;
@@ -363,12 +381,16 @@ impl Run<'_> {
                 self.report_effects(ticket, is_end);
             }
         }
-        self.action_log.begin_plan(&std::collections::BTreeMap::new());
+        self.action_log
+            .begin_plan(&std::collections::BTreeMap::new());
     }
 }
 
 /// Returns the starts since the preparation began.
-fn starts_since(readying: &BackgroundPreparation, started: usize) -> impl Iterator<Item = ActionHandle> + use<> {
+fn starts_since(
+    readying: &BackgroundPreparation,
+    started: usize,
+) -> impl Iterator<Item = ActionHandle> + use<> {
     (readying.started..started).map(|number| ActionHandle(number as u64))
 }
 

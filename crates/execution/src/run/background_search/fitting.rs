@@ -17,14 +17,22 @@ pub(in crate::run) type StartedPlan = (TimeTriggeredPlan, Situation, Vec<ActionH
 
 impl Run<'_> {
     /// Returns the ticket of a step of the earlier plan.
-    fn ticket_in_earlier_plan(&self, search: &BackgroundSearch, step: StepId) -> Option<ActionHandle> {
+    fn ticket_in_earlier_plan(
+        &self,
+        search: &BackgroundSearch,
+        step: StepId,
+    ) -> Option<ActionHandle> {
         let left_behind = search.abandoned_steps.get(&step).copied();
         left_behind.or_else(|| self.action_log.ticket(step))
     }
 
     /// Returns the plan from the present situation: without the executed steps, and shifted by its
     /// delay.
-    pub(super) fn fit_to_present(&self, search: &BackgroundSearch, plan: &TimeTriggeredPlan) -> Option<StartedPlan> {
+    pub(super) fn fit_to_present(
+        &self,
+        search: &BackgroundSearch,
+        plan: &TimeTriggeredPlan,
+    ) -> Option<StartedPlan> {
         let first = search.expected.first().map(|it| it.ticket);
         let mut done = BTreeSet::new();
         let mut left: Vec<Step> = Vec::new();

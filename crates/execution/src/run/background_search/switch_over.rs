@@ -5,12 +5,12 @@ use std::sync::Arc;
 use elbowroom_model::TimeTriggeredPlan;
 use elbowroom_num::Rational;
 
+use super::super::pending::PreparationFallback;
 use super::super::plan_start::PlanStart;
 use super::super::prediction::ExpectedStart;
-use super::super::pending::PreparationFallback;
 use super::super::{Run, Stop};
 use super::fitting::StartedPlan;
-use super::{ExecutionDuringSearch, BackgroundSearch, MAX_START_REPORT_WAIT};
+use super::{BackgroundSearch, ExecutionDuringSearch, MAX_START_REPORT_WAIT};
 use crate::executor::PlanEvent;
 
 impl Run<'_> {
@@ -82,7 +82,8 @@ impl Run<'_> {
     pub(super) fn report_past_events(&mut self) {
         let mut surprises = std::mem::take(&mut self.plan_events);
         surprises.retain(|it| !matches!(it, PlanEvent::Started { .. } | PlanEvent::Ended { .. }));
-        self.work_queue.push(super::PendingStep::ReportNews(surprises));
+        self.work_queue
+            .push(super::PendingStep::ReportNews(surprises));
     }
 
     /// Switches to a finished plan when it is due, or prepares it. Returns `true` if the executor
@@ -101,9 +102,11 @@ impl Run<'_> {
             || search.expected.iter().all(is_begun);
         // A plan cannot include commanded actions whose start has not been reported.
         let is_told = |ticket| self.belief.running().contains_key(&ticket);
-        let waits_for_word =
-            !self.action_log.open_tickets().all(is_told) && self.now < since + Rational::from(MAX_START_REPORT_WAIT);
-        if search.execution != ExecutionDuringSearch::RunningActionsOnly && (!is_due || waits_for_word) {
+        let waits_for_word = !self.action_log.open_tickets().all(is_told)
+            && self.now < since + Rational::from(MAX_START_REPORT_WAIT);
+        if search.execution != ExecutionDuringSearch::RunningActionsOnly
+            && (!is_due || waits_for_word)
+        {
             return Ok(false);
         }
         let fit = self.fit_to_present(search, plan);
@@ -115,7 +118,11 @@ impl Run<'_> {
     }
 
     /// Switches to the fitted plan, or prepares it. Without a fit, the plan is outdated.
-    fn switch_to_fitted(&mut self, search: BackgroundSearch, fit: Option<StartedPlan>) -> Result<(), Stop> {
+    fn switch_to_fitted(
+        &mut self,
+        search: BackgroundSearch,
+        fit: Option<StartedPlan>,
+    ) -> Result<(), Stop> {
         if let Some(fit) = fit {
             if self.settings.readies_aside {
                 self.begin_preparation(search, fit, true);

@@ -9,7 +9,7 @@ use indexmap::IndexMap;
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::{Planning, Published, LinkedParameters};
+use super::{LinkedParameters, Planning, Published};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]

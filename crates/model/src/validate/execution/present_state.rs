@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use elbowroom_num::Rational;
 
 use super::super::evaluate::{Fault, evaluate};
-use super::super::state::{Motion, BasicState, Rate};
+use super::super::state::{BasicState, Motion, Rate};
 use super::MeasuredAmount;
 use crate::derivation;
 use crate::ground::{Change, Expression, FactId, FluentId};

@@ -3,7 +3,7 @@
 use elbowroom_num::Rational;
 
 use super::super::evaluate::Fault;
-use super::super::violation::{ViolationKind, ConditionTime};
+use super::super::violation::{ConditionTime, ViolationKind};
 use super::Execution;
 use super::present_state::Indeterminate;
 use crate::ground::{Action, Body, Condition};

@@ -2,7 +2,7 @@
 
 use super::world::{World, number};
 use crate::problem::{Body, Condition, ObjectId, Term};
-use crate::validate::{ViolationKind, Reason, ConditionTime};
+use crate::validate::{ConditionTime, Reason, ViolationKind};
 
 #[test]
 fn a_numeric_condition_names_values_and_the_shortfall() {

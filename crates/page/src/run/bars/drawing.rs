@@ -1,8 +1,8 @@
 //! Plans and executed actions, as bars and as a table.
 
 use elbowroom::num::Rational;
-use elbowroom::report::schema::WindowLine;
 use elbowroom::report::decimal::nearest;
+use elbowroom::report::schema::WindowLine;
 
 use super::{Bars, Start, Step, answer};
 use crate::document::{Bar, Mark, Table, Text};
@@ -33,7 +33,10 @@ impl Bars {
 
     /// Returns all bars: starts in order, and then the steps that were not started.
     pub(in crate::run) fn draw_bars(&self, now: &Rational) -> Vec<Bar> {
-        let starts = self.starts.values().map(|start| self.started_bar(start, now));
+        let starts = self
+            .starts
+            .values()
+            .map(|start| self.started_bar(start, now));
         let waiting = self.steps.iter().filter(|step| !step.is_ordered);
         starts.chain(waiting.map(unstarted_bar)).collect()
     }
@@ -114,7 +117,8 @@ impl Bars {
                 .map(|(begun, end)| (begun.to_f64(), end.to_f64())),
             outcome,
             starts: drawable_window(&start.due),
-            ends: drawable_window(&start.end_due).or_else(|| step.and_then(|it| band(&it.end_window))),
+            ends: drawable_window(&start.end_due)
+                .or_else(|| step.and_then(|it| band(&it.end_window))),
             plan: step.map_or(0, |step| step.plan),
             details,
             ..Bar::default()

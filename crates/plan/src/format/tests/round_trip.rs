@@ -62,7 +62,9 @@ fn build(
     let mut plan = read(text.as_bytes(), &task).unwrap_or_else(|errors| panic!("{errors}"));
     // All nodes but the timed initials, which files do not mention.
     let nodes = plan.plan.nodes.len() - 1;
-    plan.plan.constraints.extend(merged_constraints(nodes, constraints));
+    plan.plan
+        .constraints
+        .extend(merged_constraints(nodes, constraints));
     for (index, (nominal, weight, lower, upper, place)) in parameters.into_iter().enumerate() {
         let id = ParameterId::from(plan.parameters.len());
         let mut kind = ParameterKind::Bound;

@@ -158,7 +158,8 @@ impl Stepper<'_> {
         let may_pass = |test: u32, open: &OpenAction| {
             let mut is_governed = false;
             let difference = &self.compiled.tests[test as usize].difference;
-            difference.visit_fluents(&mut |fluent| is_governed |= symbolic.is_time_dependent(fluent));
+            difference
+                .visit_fluents(&mut |fluent| is_governed |= symbolic.is_time_dependent(fluent));
             is_governed
                 || difference.reads_duration()
                 || state.test_holds(self.compiled, test, open.duration.as_ref())

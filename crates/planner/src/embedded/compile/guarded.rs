@@ -84,7 +84,11 @@ fn has_chosen_duration(action: &Action) -> bool {
     action.durative().is_some_and(|body| !is_fixed(body))
 }
 
-fn reads_moving_number(expression: &Expression, reads_duration: bool, moving: &BTreeSet<FluentId>) -> bool {
+fn reads_moving_number(
+    expression: &Expression,
+    reads_duration: bool,
+    moving: &BTreeSet<FluentId>,
+) -> bool {
     let mut moves = false;
     expression.visit_leaves(&mut |leaf| {
         moves |= match leaf {

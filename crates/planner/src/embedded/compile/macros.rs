@@ -22,7 +22,9 @@ impl Macro {
         let envelopes = (0..).zip(&compiled.actions);
         let envelopes = envelopes.filter(|(_, action)| can_be_envelope(compiled, action));
         let envelopes: Vec<(u32, &Action)> = envelopes.collect();
-        let offers = envelopes.iter().map(|(_, action)| literals_while_running(compiled, action));
+        let offers = envelopes
+            .iter()
+            .map(|(_, action)| literals_while_running(compiled, action));
         let offers: Vec<Vec<Literal>> = offers.collect();
         if offers.iter().all(Vec::is_empty) {
             return Vec::new();

@@ -6,7 +6,7 @@ use super::super::relaxed::in_windows;
 use super::super::state::{OpenAction, State};
 use super::super::time::{NEVER, Ticks};
 use super::model::Kind;
-use super::{MAX_ENDED, H2};
+use super::{H2, MAX_ENDED};
 
 impl H2<'_> {
     /// Returns the earliest time of an operator, or `None` if it cannot happen.

@@ -168,7 +168,11 @@ impl Tree {
 impl Repair<'_, '_> {
     /// Searches for a repair. Returns the items from `begin` of a plan that reaches the goal in
     /// time.
-    pub(super) fn run(&mut self, begin: &SequenceState, ticker: &mut WorkMeter<'_>) -> Option<Vec<Item>> {
+    pub(super) fn run(
+        &mut self,
+        begin: &SequenceState,
+        ticker: &mut WorkMeter<'_>,
+    ) -> Option<Vec<Item>> {
         self.search(begin, &mut Tree::default(), ticker)
     }
 
@@ -251,7 +255,13 @@ impl Repair<'_, '_> {
 
     /// Queues the successors that insert an action of the intent. Each is estimated to reduce the
     /// remaining cost by the cost of its action.
-    fn queue_insertions(&mut self, node: &Node, intent: &InsertionPlan, preferred: &[Step], tree: &mut Tree) {
+    fn queue_insertions(
+        &mut self,
+        node: &Node,
+        intent: &InsertionPlan,
+        preferred: &[Step],
+        tree: &mut Tree,
+    ) {
         let starts = intent.actions.iter().map(|&action| Step::Start(action));
         let ends = preferred
             .iter()
@@ -347,7 +357,11 @@ impl Repair<'_, '_> {
     /// Moves the position of the estimates to `place`. Actions before it have their own costs;
     /// actions of the remaining plan cost nothing.
     fn move_to(&mut self, place: usize, tree: &mut Tree) {
-        let Tree { position: standing, remaining_counts: left, .. } = tree;
+        let Tree {
+            position: standing,
+            remaining_counts: left,
+            ..
+        } = tree;
         while *standing < place {
             let item = self.remaining[*standing];
             *standing += 1;

@@ -108,7 +108,8 @@ impl Schedule<'_, '_> {
         first: usize,
         ticker: &mut WorkMeter<'_>,
     ) -> Option<Vec<Item>> {
-        let mut scene = super::sequence_state_at(self.compiled, self.stepper, &items[..first], ticker)?;
+        let mut scene =
+            super::sequence_state_at(self.compiled, self.stepper, &items[..first], ticker)?;
         let mut order = items[..first].to_vec();
         let mut waiting: Vec<Item> = Vec::new();
         for &item in &items[first..] {

@@ -13,10 +13,10 @@ mod clauses;
 mod links;
 mod model;
 mod numbers;
+mod rescheduling;
 #[cfg(test)]
 mod tests;
 mod times;
-mod rescheduling;
 mod windows;
 
 use std::collections::BTreeSet;

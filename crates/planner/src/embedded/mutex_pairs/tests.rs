@@ -132,7 +132,9 @@ impl<'a> ReferenceTable<'a> {
 
     fn sure_after(operator: &Operator) -> Vec<usize> {
         let needs = operator.needs.iter().copied();
-        let mut after: Vec<usize> = needs.filter(|&need| !can_be_removed(operator, need)).collect();
+        let mut after: Vec<usize> = needs
+            .filter(|&need| !can_be_removed(operator, need))
+            .collect();
         after.extend(&operator.adds);
         after
     }
@@ -149,7 +151,9 @@ impl<'a> ReferenceTable<'a> {
         };
         let context: Vec<usize> = self.context(operator).into_iter().filter(is_left).collect();
         let gone = context.iter().copied();
-        let gone: Vec<usize> = gone.filter(|&atom| can_be_removed(operator, atom)).collect();
+        let gone: Vec<usize> = gone
+            .filter(|&atom| can_be_removed(operator, atom))
+            .collect();
         let mut pairs = product(&gone, &context);
         pairs.retain(|&(one, other)| self.holds(one, other));
         pairs

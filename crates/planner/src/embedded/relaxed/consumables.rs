@@ -147,8 +147,11 @@ impl Consumables {
     /// Begins a new relaxed plan.
     pub(super) fn reset(&mut self, state: &State) {
         self.remaining.clear();
-        self.remaining
-            .extend(self.list.iter().map(|consumable| consumable.remaining(state)));
+        self.remaining.extend(
+            self.list
+                .iter()
+                .map(|consumable| consumable.remaining(state)),
+        );
     }
 
     /// Returns the number of times the remaining amounts suffice for an operator, at most `most`.
@@ -163,7 +166,9 @@ impl Consumables {
                 clippy::cast_sign_loss,
                 reason = "clamped to a small positive range"
             )]
-            let times = ((self.remaining[place] + 1e-9) / amount).floor().clamp(0.0, 1e6) as u32;
+            let times = ((self.remaining[place] + 1e-9) / amount)
+                .floor()
+                .clamp(0.0, 1e6) as u32;
             most.min(times)
         })
     }

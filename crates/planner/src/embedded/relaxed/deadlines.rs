@@ -5,8 +5,8 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use super::super::compile::{Compiled, NONE};
-use super::super::network::SETTLED;
 use super::super::end_windows::EndWindows;
+use super::super::network::SETTLED;
 use super::super::state::State;
 use super::super::time::{NEVER, Ticks};
 use super::graph::{Graph, Kind, Operator};

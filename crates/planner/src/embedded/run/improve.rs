@@ -13,9 +13,9 @@ use super::super::answer::Stopped;
 use super::super::search::{Aim, Search, Strategy};
 use super::super::symmetry::Symmetry;
 use super::super::tuning::Technique;
-use super::refining::LocalSearch;
 use super::parallel::{Job, ReportCallback};
-use super::worker::{SearchBudget, Frame, Outcome, Worker};
+use super::refining::LocalSearch;
+use super::worker::{Frame, Outcome, SearchBudget, Worker};
 use super::{Planner, share};
 
 /// Divisor of the memory left by the searches: limit for the repair of each of two strands. Half of
@@ -195,7 +195,9 @@ impl<'a> Planner<'a> {
             let is_over = match rest {
                 RemainingSpace::Unexplored => false,
                 // Plans that the searches cannot reach may be found near the best plan.
-                RemainingSpace::ExhaustedIncomplete => !self.is_refining() || self.improvement_work >= self.least(),
+                RemainingSpace::ExhaustedIncomplete => {
+                    !self.is_refining() || self.improvement_work >= self.least()
+                }
                 RemainingSpace::Exhausted => return Stopped::Exhausted,
             };
             if is_over {
@@ -240,7 +242,9 @@ impl<'a> Planner<'a> {
                     remaining,
                 }
             })]);
-            return ended.pop().map_or(RemainingSpace::Unexplored, |ended| ended.remaining);
+            return ended
+                .pop()
+                .map_or(RemainingSpace::Unexplored, |ended| ended.remaining);
         }
         let mut refiners = std::mem::take(&mut self.refiners);
         let own_task = self.second_task.take();
@@ -268,25 +272,26 @@ impl<'a> Planner<'a> {
         let (first, others) = refiners.split_at_mut(1);
         let first = &mut first[0];
         let best = self.best.clone();
-        let mut jobs: Vec<Job<'_, WorkerResult>> = vec![Box::new(move |tell: ReportCallback<'_>| {
-            let mut strand = Worker::new(frame, best, unreported, tell);
-            let (mut work, mut rest) = (0, RemainingSpace::Unexplored);
-            if contest.is_finding {
-                (work, rest) = contest.run_turns(&mut strand, length);
-            } else if let Ok(most) = u64::try_from(contest.credit)
-                && most > 0
-            {
-                (work, rest) = contest.run_turns(&mut strand, most);
-                contest.credit = contest.credit.saturating_sub_unsigned(work);
-            }
-            if !strand.is_stopped && rest != RemainingSpace::Exhausted {
-                strand.refine(first, newest, length.saturating_sub(work));
-            }
-            WorkerResult {
-                unreported: strand.end(false),
-                remaining,
-            }
-        })];
+        let mut jobs: Vec<Job<'_, WorkerResult>> =
+            vec![Box::new(move |tell: ReportCallback<'_>| {
+                let mut strand = Worker::new(frame, best, unreported, tell);
+                let (mut work, mut rest) = (0, RemainingSpace::Unexplored);
+                if contest.is_finding {
+                    (work, rest) = contest.run_turns(&mut strand, length);
+                } else if let Ok(most) = u64::try_from(contest.credit)
+                    && most > 0
+                {
+                    (work, rest) = contest.run_turns(&mut strand, most);
+                    contest.credit = contest.credit.saturating_sub_unsigned(work);
+                }
+                if !strand.is_stopped && rest != RemainingSpace::Exhausted {
+                    strand.refine(first, newest, length.saturating_sub(work));
+                }
+                WorkerResult {
+                    unreported: strand.end(false),
+                    remaining,
+                }
+            })];
         if let (Some(second), Some(task)) = (others.first_mut(), &own_task) {
             let frame = Frame { task, ..frame };
             let best = self.best.clone();
@@ -304,6 +309,8 @@ impl<'a> Planner<'a> {
         self.improvement_work = self.improvement_work.saturating_add(length);
         self.refiners = refiners;
         self.second_task = own_task;
-        ended.first().map_or(RemainingSpace::Unexplored, |ended| ended.remaining)
+        ended
+            .first()
+            .map_or(RemainingSpace::Unexplored, |ended| ended.remaining)
     }
 }

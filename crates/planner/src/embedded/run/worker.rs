@@ -7,15 +7,15 @@ use elbowroom_model::validate::{self, Verdict};
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan, validate_from};
 use elbowroom_num::work;
 
+use super::super::action_elimination::without_redundant_actions;
 use super::super::answer::{Counts, FoundPlan, Objective, Phase, Settings};
 use super::super::apply::Step;
 use super::super::bound::MetricBound;
 use super::super::compile::Compiled;
-use super::super::trajectory::{delayed, validated_without_observers};
 use super::super::extract;
 use super::super::mutex_pairs::MutexPairs;
-use super::super::action_elimination::without_redundant_actions;
-use super::super::search::{Aim, Search, Expansion};
+use super::super::search::{Aim, Expansion, Search};
+use super::super::trajectory::{delayed, validated_without_observers};
 use super::parallel::ReportCallback;
 
 /// Work between two reports, in operators of estimates and their effects: about ten milliseconds.
@@ -339,7 +339,9 @@ impl<'a, 't> Worker<'a, 't> {
             compiled,
             ..
         } = self.frame;
-        let judged = extract::plan_of(task, situation, compiled, steps, &mut || self.report_progress());
+        let judged = extract::plan_of(task, situation, compiled, steps, &mut || {
+            self.report_progress()
+        });
         if self.is_stopped {
             return CandidateVerdict::Stopped;
         }

@@ -6,7 +6,7 @@ use super::super::relaxed::Labels;
 use super::super::state::State;
 use super::super::tuning::IS_WHOLE;
 use super::novelty::goals_left;
-use super::{Search, Expansion};
+use super::{Expansion, Search};
 
 /// Work of a turn that searches for landmarks, per unit of the maximum work of an estimate.
 const WORK_OF_TURN: u64 = 4;

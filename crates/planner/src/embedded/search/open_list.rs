@@ -65,7 +65,7 @@ impl OpenList {
 
 #[cfg(test)]
 mod tests {
-    use super::{OpenList, Step, QueuedSuccessor};
+    use super::{OpenList, QueuedSuccessor, Step};
 
     fn filled() -> OpenList {
         let mut queue = OpenList::default();

@@ -218,7 +218,7 @@ mod tests {
 
     use proptest::prelude::*;
 
-    use super::{Step, QueuedSuccessor, SuccessorList};
+    use super::{QueuedSuccessor, Step, SuccessorList};
 
     #[test]
     fn step_round_trips() {
@@ -256,7 +256,8 @@ mod tests {
 
     fn operations() -> impl Strategy<Value = Vec<Operation>> {
         let number = prop_oneof![0_u32..3, 0_u32..300, 0..u32::MAX];
-        let entry = (number.clone(), number).prop_map(|(parent, step)| QueuedSuccessor { parent, step });
+        let entry =
+            (number.clone(), number).prop_map(|(parent, step)| QueuedSuccessor { parent, step });
         let operation = prop_oneof![
             3 => entry.clone().prop_map(Operation::PushBack),
             1 => entry.prop_map(Operation::PushFront),

@@ -36,7 +36,9 @@ impl Search<'_> {
         }
         let rank = self.rank(number, estimate.steps);
         for &step in &estimate.preferred {
-            self.memory += self.preferred.push(rank, QueuedSuccessor::step(number, step));
+            self.memory += self
+                .preferred
+                .push(rank, QueuedSuccessor::step(number, step));
         }
         self.generated += estimate.applicable.len() as u64;
         if self.is_timeless && !estimate.applicable.is_empty() {

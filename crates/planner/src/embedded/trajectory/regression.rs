@@ -87,7 +87,9 @@ impl Moment<'_> {
         self.effects
             .iter()
             .any(|effect| match (&effect.change, &literal.subject) {
-                (Change::Add(atom), LiteralSubject::Fact(predicate, _)) => atom.predicate == *predicate,
+                (Change::Add(atom), LiteralSubject::Fact(predicate, _)) => {
+                    atom.predicate == *predicate
+                }
                 _ => false,
             })
     }

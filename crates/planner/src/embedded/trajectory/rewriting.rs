@@ -122,7 +122,10 @@ impl<'a> Rewriting<'a> {
     }
 
     /// Returns an obstacle as an error, or `None` if the coverage permits omitting the constraint.
-    pub(super) fn apply_coverage<T>(&self, found: Result<T, Obstacle>) -> Result<Option<T>, Obstacle> {
+    pub(super) fn apply_coverage<T>(
+        &self,
+        found: Result<T, Obstacle>,
+    ) -> Result<Option<T>, Obstacle> {
         match found {
             Ok(found) => Ok(Some(found)),
             Err(Obstacle::Feature(_)) if self.coverage == Coverage::Expressible => Ok(None),
@@ -239,7 +242,11 @@ impl<'a> Rewriting<'a> {
         self.goals.push(holds(paid));
         for clause in found {
             let owes = delete(paid);
-            self.watch(modal, clause, Consequence::EffectOrObservation(owes, answer.clone()));
+            self.watch(
+                modal,
+                clause,
+                Consequence::EffectOrObservation(owes, answer.clone()),
+            );
         }
         Ok(())
     }

@@ -102,7 +102,9 @@ impl Rewriting<'_> {
         }
         let locked = self.predicate("locked");
         let open = self.predicate("open");
-        let against = rest.iter().flat_map(|literal| self.falsification_times(literal));
+        let against = rest
+            .iter()
+            .flat_map(|literal| self.falsification_times(literal));
         match against.filter(|other| other < time).max() {
             Some(since) => self.timed(since, TimedChange::Add(open, Vec::new())),
             None => self.problem.initial_facts.push((open, Vec::new())),

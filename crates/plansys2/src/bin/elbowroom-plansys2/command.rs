@@ -66,7 +66,11 @@ pub(super) fn plan(
 ///
 /// # Errors
 /// The domain is invalid. The text holds the messages of the command.
-pub(super) fn validate(elbowroom: &str, domain: String, patience: &ChildLimits) -> Result<(), String> {
+pub(super) fn validate(
+    elbowroom: &str,
+    domain: String,
+    patience: &ChildLimits,
+) -> Result<(), String> {
     // The problem is empty, because only the domain is checked.
     let problem = format!(
         "(define (problem any) (:domain {}) (:init) (:goal (and)))",

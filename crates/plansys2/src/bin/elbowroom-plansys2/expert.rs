@@ -6,9 +6,9 @@ use std::time::Duration;
 
 use elbowroom_plansys2::interface::Empty;
 use elbowroom_plansys2::knowledge::{AffectRequest, AffectResponse, StatesResponse};
-use elbowroom_plansys2::{Answer, Call, CallId, ProblemSync, ExternalChange};
+use elbowroom_plansys2::{Answer, Call, CallId, ExternalChange, ProblemSync};
 
-use super::network::{RequestId, Network, ServiceClient, reliable};
+use super::network::{Network, RequestId, ServiceClient, reliable};
 use super::{Input, warn};
 
 /// Maximum number of pending requests. Older ones are assumed to be lost.
@@ -87,7 +87,11 @@ impl Expert {
     }
 
     /// Takes the beliefs of the run.
-    pub(super) fn set_beliefs(&mut self, facts: &[(String, bool)], values: &[(String, Option<f64>)]) {
+    pub(super) fn set_beliefs(
+        &mut self,
+        facts: &[(String, bool)],
+        values: &[(String, Option<f64>)],
+    ) {
         self.mirror.set_beliefs(facts, values);
     }
 
@@ -106,10 +110,7 @@ impl Expert {
             }
             ExpertMessage::Done(to, it) => (to, Answer::Done(outcome(it.success, it.error_info))),
         };
-        let place = self
-            .open
-            .iter()
-            .position(|(asked, _)| asked.matches(&to));
+        let place = self.open.iter().position(|(asked, _)| asked.matches(&to));
         if let Some((_, call)) = place.and_then(|place| self.open.remove(place)) {
             self.mirror.on_answer(call, answer);
         }
@@ -128,8 +129,9 @@ impl Expert {
         self.mirror.set_available(is_there);
         self.mirror.tick(now);
         for (id, call) in self.mirror.calls() {
-            let to =
-                |requests: &mut ServiceClient<AffectRequest>, node| requests.send(AffectRequest { node });
+            let to = |requests: &mut ServiceClient<AffectRequest>, node| {
+                requests.send(AffectRequest { node })
+            };
             let asked = match call {
                 Call::Predicates => self.predicates.send(Empty::default()),
                 Call::Functions => self.functions.send(Empty::default()),

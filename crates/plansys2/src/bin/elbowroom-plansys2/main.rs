@@ -23,7 +23,7 @@ use elbowroom_plansys2::message::{ActionExecution, ActionPerformerStatus};
 
 use command::Planned;
 use expert::{Expert, ExpertMessage};
-use network::{RequestId, Network};
+use network::{Network, RequestId};
 use options::{Mode, Options, ProblemExpert, ServeOptions};
 use services::{ServiceRequest, Services};
 use topics::Topics;

@@ -415,7 +415,9 @@ where
                         identity.sequence_number = own.sequence_number;
                     }
                     match self.read(&sample.into_value(), own.writer_guid) {
-                        Ok((header, message)) => (self.input)(RequestId { identity, header }, message),
+                        Ok((header, message)) => {
+                            (self.input)(RequestId { identity, header }, message)
+                        }
                         Err(why) => Input::Warning(format!("a message was not understood: {why}")),
                     }
                 }

@@ -18,14 +18,14 @@ use elbowroom_plansys2::interface::{
 };
 use elbowroom_plansys2::message::Stamp;
 use elbowroom_plansys2::{
-    Command, Effect, Goals, Hub, Lifecycle, Progress, ActionHandle, World, plan_text,
+    ActionHandle, Command, Effect, Goals, Hub, Lifecycle, Progress, World, plan_text,
 };
 
 use super::command::{Planned, Running};
 use super::expert::Expert;
 use super::network::RequestId;
 use super::options::{ServeSettings, Settings};
-use super::services::{ServiceRequest, EXECUTOR, NODES, Part, Services};
+use super::services::{EXECUTOR, NODES, Part, ServiceRequest, Services};
 use super::session::now;
 use super::topics::Topics;
 use super::{Input, warn};
@@ -246,7 +246,11 @@ impl Server {
                     .services
                     .goal
                     .answer(who, GoalResponse { accepted, stamp });
-                sent.and_then(|()| self.services.statuses.publish_message(self.goals.statuses()))
+                sent.and_then(|()| {
+                    self.services
+                        .statuses
+                        .publish_message(self.goals.statuses())
+                })
             }
             ServiceRequest::Cancel(who, request) => {
                 let (is_given_up, response) = self.goals.cancel(&request);
@@ -254,12 +258,18 @@ impl Server {
                     self.interrupt();
                 }
                 let sent = self.services.cancel.answer(who, response);
-                sent.and_then(|()| self.services.statuses.publish_message(self.goals.statuses()))
+                sent.and_then(|()| {
+                    self.services
+                        .statuses
+                        .publish_message(self.goals.statuses())
+                })
             }
-            ServiceRequest::Result(who, request) => match self.goals.request_result(request.goal_id, who) {
-                Some((who, result)) => self.services.result.answer(who, result),
-                None => Ok(()),
-            },
+            ServiceRequest::Result(who, request) => {
+                match self.goals.request_result(request.goal_id, who) {
+                    Some((who, result)) => self.services.result.answer(who, result),
+                    None => Ok(()),
+                }
+            }
             ServiceRequest::State(node, who) => {
                 let current_state = self.nodes[node].state();
                 self.services.state[node].answer(who, StateResponse { current_state })
@@ -321,7 +331,11 @@ impl Server {
             run.interrupt();
             return Err("there was a goal of that number".to_owned());
         }
-        warn_on_error(self.services.executing.publish_message(request.plan.clone()));
+        warn_on_error(
+            self.services
+                .executing
+                .publish_message(request.plan.clone()),
+        );
         self.runs += 1;
         let mut world = World::new("plansys2", self.speed);
         if let Some(expert) = &mut self.expert {
@@ -387,7 +401,11 @@ impl Server {
         for (who, result) in self.goals.end(is_reached, infos) {
             warn_on_error(self.services.result.answer(who, result));
         }
-        warn_on_error(self.services.statuses.publish_message(self.goals.statuses()));
+        warn_on_error(
+            self.services
+                .statuses
+                .publish_message(self.goals.statuses()),
+        );
     }
 
     /// Applies the effects of the hub, and answers the run if an answer is due.

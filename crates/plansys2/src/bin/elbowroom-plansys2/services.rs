@@ -8,7 +8,7 @@ use elbowroom_plansys2::interface::{
 use elbowroom_plansys2::knowledge::SubGoalsResponse;
 
 use super::Input;
-use super::network::{ServiceReplies, RequestId, TopicPublisher, Network, latched, reliable};
+use super::network::{Network, RequestId, ServiceReplies, TopicPublisher, latched, reliable};
 
 /// Nodes that this program replaces.
 pub(super) const NODES: [&str; 2] = ["planner", "executor"];

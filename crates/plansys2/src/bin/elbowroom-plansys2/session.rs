@@ -5,7 +5,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use elbowroom_plansys2::{PerformerDiscovery, Command, Effect, Hub, World};
+use elbowroom_plansys2::{Command, Effect, Hub, PerformerDiscovery, World};
 use serde_json::Value;
 
 use super::expert::{Expert, ExpertMessage};

@@ -3,7 +3,7 @@
 use elbowroom_plansys2::message::ActionExecution;
 
 use super::Input;
-use super::network::{TopicPublisher, Network, reliable};
+use super::network::{Network, TopicPublisher, reliable};
 
 /// Publisher of messages to the performers. Their messages arrive as inputs.
 pub(super) struct Topics {

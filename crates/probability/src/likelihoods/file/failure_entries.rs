@@ -263,7 +263,12 @@ impl Reader<'_> {
     }
 
     /// Records a section with effects of failures.
-    pub(super) fn note_failure_effects(&mut self, key: &Key<'_>, failing: &FailureModel, about: SectionSubject) {
+    pub(super) fn note_failure_effects(
+        &mut self,
+        key: &Key<'_>,
+        failing: &FailureModel,
+        about: SectionSubject,
+    ) {
         if failing.has_failure_effects() {
             self.failure_sections.push((key.span(), about));
         }

@@ -3,7 +3,7 @@
 use elbowroom_model::ground::FactId;
 
 use super::super::cluster::Cluster;
-use super::super::outcome::{spontaneous_kernel, rate_kernel};
+use super::super::outcome::{rate_kernel, spontaneous_kernel};
 use super::{Facts, MAX_COUPLED, Record};
 use crate::model::Model;
 

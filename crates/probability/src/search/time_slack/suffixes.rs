@@ -12,8 +12,8 @@ use elbowroom_plan::{InstanceId, Node, NodeId};
 
 use super::super::separations::Separations;
 use super::{Point, TimeSlack};
-use crate::search_state::SearchState;
 use crate::model::Model;
+use crate::search_state::SearchState;
 use crate::total_order::Slot;
 
 /// With more points than this, a rest and those before it are not projected: a matrix for each
@@ -85,7 +85,9 @@ impl Suffixes {
                     match room.before(model, separations, (sequence[position], behind), next_timed)
                     {
                         None => SuffixNetwork::Never,
-                        Some(room) if room.points.len() > MOST_POINTS => SuffixNetwork::TooManyRunning,
+                        Some(room) if room.points.len() > MOST_POINTS => {
+                            SuffixNetwork::TooManyRunning
+                        }
                         Some(room) => SuffixNetwork::Projected(room),
                     }
                 }
@@ -129,9 +131,9 @@ impl Suffixes {
             SuffixNetwork::Never => FirstWindow::Never,
             SuffixNetwork::TooManyRunning => FirstWindow::Unknown,
             SuffixNetwork::Projected(room) => {
-                let first = room
-                    .clone()
-                    .first_window_at(separations, sequence[position], circumstances);
+                let first =
+                    room.clone()
+                        .first_window_at(separations, sequence[position], circumstances);
                 first.map_or(FirstWindow::Never, FirstWindow::In)
             }
         }

@@ -1,15 +1,15 @@
 //! Adopted plan in a snapshot.
 
 use elbowroom_execution::run::{GivenGoal, Goals, KnownStart, PlanAdoption, Wait};
-use elbowroom_execution::{GoalTerms, Guards, PlanEvent, ActionHandle};
+use elbowroom_execution::{ActionHandle, GoalTerms, Guards, PlanEvent};
 use elbowroom_model::{RunningAction, Situation, State, Task};
 use elbowroom_num::Interval;
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
-use super::super::schema::{StepLine, TermsLine};
 use super::super::encode::steps;
 use super::super::replay::read_plan;
+use super::super::schema::{StepLine, TermsLine};
 use super::starts::{action_of, exact};
 use super::{fact, fluent};
 use crate::exact::Exact;
@@ -266,7 +266,11 @@ impl PlanAdoptionLine {
         })
     }
 
-    pub(super) fn to_plan_adoption(&self, task: &Task, starts: &[KnownStart]) -> Result<PlanAdoption, String> {
+    pub(super) fn to_plan_adoption(
+        &self,
+        task: &Task,
+        starts: &[KnownStart],
+    ) -> Result<PlanAdoption, String> {
         let facts = self.facts.iter().map(|name| fact(task, name));
         let values = self.numbers.iter();
         let values = values.map(|(name, value)| Ok((fluent(task, name)?, value.0.clone())));
@@ -284,7 +288,11 @@ impl PlanAdoptionLine {
         Ok(PlanAdoption {
             plan: plan.map_err(|error| error.message)?,
             situation,
-            running: self.under_way.iter().map(|it| ActionHandle(it.ticket)).collect(),
+            running: self
+                .under_way
+                .iter()
+                .map(|it| ActionHandle(it.ticket))
+                .collect(),
             begun_steps: self.begun.iter().copied().map(ActionHandle).collect(),
             goals: Goals {
                 open: goals_of(&self.goals),
@@ -331,7 +339,9 @@ impl NewsLine {
             PlanEvent::Value(fluent) => Some(Self::Number(task.fluent_name(*fluent))),
             PlanEvent::Contradiction { action } => Some(Self::Contradiction(action.clone())),
             // Events about steps of an earlier plan are irrelevant for a new one.
-            PlanEvent::Started { .. } | PlanEvent::Ended { .. } | PlanEvent::TimedOut { .. } => None,
+            PlanEvent::Started { .. } | PlanEvent::Ended { .. } | PlanEvent::TimedOut { .. } => {
+                None
+            }
         }
     }
 

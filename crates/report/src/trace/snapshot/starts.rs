@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use elbowroom_execution::run::KnownStart;
-use elbowroom_execution::{Ending, Guards, Measured, ActionHandle, RunningActionParts};
+use elbowroom_execution::{ActionHandle, Ending, Guards, Measured, RunningActionParts};
 use elbowroom_model::Task;
 use elbowroom_model::ground::Action;
 use elbowroom_num::Rational;

@@ -26,15 +26,19 @@ impl Reader<'_> {
             return Err(self.error_at(&span, message));
         }
         let probability = given.probability.as_ref();
-        let probability =
-            probability.ok_or_else(|| self.error_at(&section.span(), "`probability` is missing"))?;
+        let probability = probability
+            .ok_or_else(|| self.error_at(&section.span(), "`probability` is missing"))?;
         let when = match &given.when {
             None => FailureTime::AtEnd,
             Some(when) => match when.get_ref().as_str() {
                 "start" => FailureTime::AtStart,
                 "midway" => FailureTime::Midway,
                 "end" => FailureTime::AtEnd,
-                _ => return Err(self.error_at(&when.span(), "write \"start\", \"midway\" or \"end\"")),
+                _ => {
+                    return Err(
+                        self.error_at(&when.span(), "write \"start\", \"midway\" or \"end\"")
+                    );
+                }
             },
         };
         if let (FailureTime::AtStart, Some(undone)) = (when, &given.undone) {
@@ -55,7 +59,9 @@ impl Reader<'_> {
                      failures, so 1 is the most"
                 );
                 let at = outcome.get_ref().probability.as_ref();
-                return Err(self.error_at(&at.map_or_else(|| outcome.span(), Spanned::span), message));
+                return Err(
+                    self.error_at(&at.map_or_else(|| outcome.span(), Spanned::span), message)
+                );
             }
             outcomes.push(found);
         }
@@ -80,7 +86,10 @@ impl Reader<'_> {
                 let message = format!("one outcome changes `{}` twice", text.get_ref());
                 return Err(self.error_at(&text.span(), message));
             }
-            changes.push(OutcomeChange { target: what, change: becomes });
+            changes.push(OutcomeChange {
+                target: what,
+                change: becomes,
+            });
             Ok(())
         };
         for (facts, truth) in [(&given.becomes_true, true), (&given.becomes_false, false)] {
@@ -97,8 +106,8 @@ impl Reader<'_> {
             for (fluent, value) in numbers {
                 let what = self.template(fluent, NameKind::Functions, action)?;
                 let number = Rational::from_f64_as_written(*value.get_ref());
-                let number =
-                    number.ok_or_else(|| self.error_at(&value.span(), "the number must be finite"))?;
+                let number = number
+                    .ok_or_else(|| self.error_at(&value.span(), "the number must be finite"))?;
                 let becomes = match how {
                     FluentOperation::Assign => FactOutcome::Value(number),
                     FluentOperation::Increase => FactOutcome::ChangedBy(number),

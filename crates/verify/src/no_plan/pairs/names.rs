@@ -9,7 +9,9 @@ impl Structure<'_> {
         let process = |number: usize| &self.processes[number];
         match self.atoms[atom] {
             Atom::Literal((fact, true)) => self.earliest_times.task.fact_name(fact),
-            Atom::Literal((fact, false)) => format!("(not {})", self.earliest_times.task.fact_name(fact)),
+            Atom::Literal((fact, false)) => {
+                format!("(not {})", self.earliest_times.task.fact_name(fact))
+            }
             Atom::Running(number) => self.processes[number].title(),
             Atom::Ended(number) => format!("ended {}", process(number).name),
         }

@@ -49,7 +49,11 @@ impl Structure<'_> {
 
     /// Visits the pairs that are true together just before a happening, and the least time before
     /// it.
-    pub fn visit_pairs_before(&self, happening: usize, visit: &mut impl FnMut(usize, usize, &Rational)) {
+    pub fn visit_pairs_before(
+        &self,
+        happening: usize,
+        visit: &mut impl FnMut(usize, usize, &Rational),
+    ) {
         let operator = &self.operators[happening];
         for (place, &one) in operator.reads.iter().enumerate() {
             for &other in &operator.reads[place..] {
@@ -101,7 +105,10 @@ impl Structure<'_> {
 
     /// Returns the earliest start of an action.
     pub fn earliest_start(&self, process: usize, known: &impl Bounds) -> Earliest {
-        match (&self.processes[process].initial_start, self.start_of[process]) {
+        match (
+            &self.processes[process].initial_start,
+            self.start_of[process],
+        ) {
             (Some(begun), _) => Earliest::From(begun.clone()),
             (None, Some(start)) => self.earliest(start, known),
             (None, None) => Earliest::Never,
@@ -110,7 +117,12 @@ impl Structure<'_> {
 
     /// Visits the atoms that are true together with `atom` just before a happening after which
     /// `atom` is still true.
-    pub fn visit_atoms_kept_with(&self, happening: usize, atom: usize, visit: &mut impl FnMut(usize, usize)) {
+    pub fn visit_atoms_kept_with(
+        &self,
+        happening: usize,
+        atom: usize,
+        visit: &mut impl FnMut(usize, usize),
+    ) {
         let operator = &self.operators[happening];
         for &one in operator.reads.iter().chain(&operator.holds) {
             visit(one, atom);
@@ -149,7 +161,12 @@ impl Structure<'_> {
 
     /// Returns the earliest end of an action with an atom that has been true since its start, and
     /// with one that has become true since.
-    pub fn earliest_ends_with(&self, process: usize, atom: usize, known: &impl Bounds) -> [Earliest; 2] {
+    pub fn earliest_ends_with(
+        &self,
+        process: usize,
+        atom: usize,
+        known: &impl Bounds,
+    ) -> [Earliest; 2] {
         let own = &self.processes[process];
         let started = match &own.initial_start {
             None => self.at_least(known, Key::Started(process, atom)).clone(),
@@ -179,7 +196,12 @@ impl Structure<'_> {
             Kind::Start(_) if !operator.has_windows => Some(time),
             Kind::Start(number) => {
                 if let Some(body) = self.processes[number].durative() {
-                    let first = moments.starts(body, &time, ConditionContext::StaticOnly, ConditionContext::StaticOnly);
+                    let first = moments.starts(
+                        body,
+                        &time,
+                        ConditionContext::StaticOnly,
+                        ConditionContext::StaticOnly,
+                    );
                     first.map(|own| own.0)
                 } else {
                     let condition = self.processes[number].instant();
@@ -189,7 +211,9 @@ impl Structure<'_> {
             Kind::End(number) => {
                 let process = &self.processes[number];
                 let end = match process.durative().filter(|_| operator.has_windows) {
-                    Some(body) => moments.end_from(body, &process.least, &time, ConditionContext::StaticOnly),
+                    Some(body) => {
+                        moments.end_from(body, &process.least, &time, ConditionContext::StaticOnly)
+                    }
                     None => Some(time),
                 };
                 let latest = process.initial_start.as_ref().zip(process.most.as_ref());

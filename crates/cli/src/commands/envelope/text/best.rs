@@ -1,6 +1,6 @@
 //! Description of the quality of the best box.
 
-use elbowroom::answers::envelope::{Best, Probability, Relax, LimitedRange, ShadowPrices};
+use elbowroom::answers::envelope::{Best, LimitedRange, Probability, Relax, ShadowPrices};
 use elbowroom::envelope::Objective;
 use elbowroom::num::Rational;
 

@@ -7,8 +7,8 @@ use elbowroom::plan::ParametrizedPlan;
 use elbowroom::{Explanation, Shortfall, pddl};
 
 use crate::limits::push_wrapped;
-use crate::terminal::{TextLayout, EMPHASIS, styled};
 use crate::number;
+use crate::terminal::{EMPHASIS, TextLayout, styled};
 
 /// Describes the reason, and the amount of the violation.
 pub(super) fn reason_text(explanation: &Explanation) -> String {

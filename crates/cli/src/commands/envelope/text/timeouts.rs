@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use elbowroom::answers::envelope::{ChosenDuration, QuantityKind, LimitedRange};
+use elbowroom::answers::envelope::{ChosenDuration, LimitedRange, QuantityKind};
 use elbowroom::execution::run::TimeoutRule;
 use elbowroom::num::Rational;
 
@@ -42,7 +42,11 @@ pub(super) fn guarantee_text(parameters: &[LimitedRange], rows: &[Row]) -> Strin
 }
 
 /// Describes the time-outs of actions, and their rule.
-pub(super) fn timeout_line(rule: &TimeoutRule, parameters: &[LimitedRange], chosen: &[ChosenDuration]) -> Option<String> {
+pub(super) fn timeout_line(
+    rule: &TimeoutRule,
+    parameters: &[LimitedRange],
+    chosen: &[ChosenDuration],
+) -> Option<String> {
     /// Maximum number of different time-outs listed, the most frequent ones.
     const MOST_LISTED: usize = 4;
     let open = parameters.iter().filter_map(|room| {

@@ -3,14 +3,14 @@
 use elbowroom_envelope::linear::Factor as Multiplicand;
 use elbowroom_envelope::obligations::{Difference, Inequality};
 use elbowroom_envelope::{
-    ConditionProof, ControlProof, RefutedCase, Oracle, Refutation, ScheduleCase, Summand, TimeRule,
-    ImpossibilityProof,
+    ConditionProof, ControlProof, ImpossibilityProof, Oracle, Refutation, RefutedCase,
+    ScheduleCase, Summand, TimeRule,
 };
 use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan, Side};
 use elbowroom_verify::sound;
 use elbowroom_verify::sound::{
     Affine, Condition, Control, Edge, Endless, Factor, FailureCase, Ground, Multiplied, Product,
-    Schedules, Sound, Strategy, TimeTerm, Wait, Violation,
+    Schedules, Sound, Strategy, TimeTerm, Violation, Wait,
 };
 use elbowroom_verify::{End, Exact};
 
@@ -183,7 +183,9 @@ fn append_case(why: &ImpossibilityProof, cases: &mut Vec<FailureCase>) -> usize 
     let place = cases.len();
     match why {
         ImpossibilityProof::NoMoment(sum) => cases.push(FailureCase::Never(summands(sum))),
-        ImpossibilityProof::Cases(ways) => cases.push(FailureCase::Ways(ways.iter().map(to_way).collect())),
+        ImpossibilityProof::Cases(ways) => {
+            cases.push(FailureCase::Ways(ways.iter().map(to_way).collect()))
+        }
         ImpossibilityProof::Split(event, after, before) => {
             let event = event.index();
             cases.push(FailureCase::Either {

@@ -14,10 +14,10 @@ use elbowroom_report::statistics::Proportion;
 use super::{BestPlanRequest, PlanAim, PlanValue};
 use crate::answers::envelope::{EnvelopeFinding, EnvelopeRequest, Search, envelope};
 use crate::answers::plan::SearchMonitor;
-use crate::answers::{StopRequest, RequestError, Observer};
-use crate::execute::{Candidate, Rollouts, RolloutSession};
-use crate::pipeline;
+use crate::answers::{Observer, RequestError, StopRequest};
+use crate::execute::{Candidate, RolloutSession, Rollouts};
 use crate::makespan::last_end;
+use crate::pipeline;
 
 /// Number of samples after each round. A plan that is significantly behind the best one gets no
 /// further samples.
@@ -120,7 +120,12 @@ impl PlanEvaluator<'_> {
                     replanning: None,
                     is_ready: true,
                 };
-                Self::Probability(Box::new(RolloutSession::new(task, rollouts, u64::MAX, &|| true)))
+                Self::Probability(Box::new(RolloutSession::new(
+                    task,
+                    rollouts,
+                    u64::MAX,
+                    &|| true,
+                )))
             }
         }
     }
@@ -140,7 +145,11 @@ impl PlanEvaluator<'_> {
     }
 }
 
-fn slack(task: &Arc<Task>, plan: &TimeTriggeredPlan, course: &mut SearchMonitor<'_>) -> Option<Value> {
+fn slack(
+    task: &Arc<Task>,
+    plan: &TimeTriggeredPlan,
+    course: &mut SearchMonitor<'_>,
+) -> Option<Value> {
     let settings = pipeline::Settings {
         search: Search::best(Objective::LeastSlack),
         ..pipeline::Settings::default()

@@ -72,7 +72,12 @@ impl StateView<'_> {
 
     /// Returns `truth` if one of the parts has this truth value, else the other value. Parts
     /// without numbers are evaluated first, so that the numbers of the others need not be defined.
-    fn evaluate_any(&self, parts: &[Condition], truth: bool, when: ReadTime<'_>) -> Result<bool, Refusal> {
+    fn evaluate_any(
+        &self,
+        parts: &[Condition],
+        truth: bool,
+        when: ReadTime<'_>,
+    ) -> Result<bool, Refusal> {
         for part in facts_first(parts) {
             if self.holds(part, when)? == truth {
                 return Ok(truth);

@@ -1,10 +1,10 @@
 //! The course from one happening of the plan to the next one.
 
-mod next_event;
+mod active_processes;
 mod events;
 mod invariants;
+mod next_event;
 mod segment;
-mod active_processes;
 
 use std::cell::OnceCell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -15,7 +15,7 @@ use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, NodeId};
 
 use super::super::{Compiler, Run};
-use super::condition::{StateView, ReadTime};
+use super::condition::{ReadTime, StateView};
 use super::{AutonomousModel, Occurrence, add_autonomous_obligation};
 use crate::linear::Linear;
 use crate::obligations::dnf::{Alternatives, WantedTruth};

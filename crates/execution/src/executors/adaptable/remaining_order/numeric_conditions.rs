@@ -11,7 +11,7 @@ use elbowroom_probability::NextHappening;
 use super::{RemainingOrder, wait};
 use crate::dispatch::{in_words, replan};
 use crate::executor::{Decided, DecisionContext};
-use crate::reason::{Subject, Cause, Reason};
+use crate::reason::{Cause, Reason, Subject};
 
 /// A start with unmet numeric conditions or duration bounds.
 pub(super) struct UnmetStart {
@@ -34,18 +34,22 @@ impl RemainingOrder {
         if next.slot.earliest > *now {
             return None;
         }
-        self.actions_to_start(next).into_iter().find_map(|instance| {
-            let step = &self.steps[instance.index()];
-            let duration = step.duration.clone().unwrap_or_default();
-            let condition = moment.belief.numeric_start_condition(&step.action, &duration);
-            let held = moment.belief.holds_on_arrival(&condition, Some(&duration));
-            (held != Ok(true)).then(|| UnmetStart {
-                is_moving: moment.belief.is_moving(&condition),
-                instance,
-                condition,
-                duration,
+        self.actions_to_start(next)
+            .into_iter()
+            .find_map(|instance| {
+                let step = &self.steps[instance.index()];
+                let duration = step.duration.clone().unwrap_or_default();
+                let condition = moment
+                    .belief
+                    .numeric_start_condition(&step.action, &duration);
+                let held = moment.belief.holds_on_arrival(&condition, Some(&duration));
+                (held != Ok(true)).then(|| UnmetStart {
+                    is_moving: moment.belief.is_moving(&condition),
+                    instance,
+                    condition,
+                    duration,
+                })
             })
-        })
     }
 
     /// Returns `true` if the conditions will not become true by waiting, so that another order is

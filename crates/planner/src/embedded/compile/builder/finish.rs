@@ -11,10 +11,10 @@ use elbowroom_model::reachability::Grounding;
 use elbowroom_model::{Footprint, Situation, TimedHappening};
 use elbowroom_num::Rational;
 
-use super::super::initial_state::{InitialState, has_values_to_change, running};
 use super::super::compressibility::{compressibility, readers};
 use super::super::directions::Shifts;
 use super::super::exclusive::{self, implied_tests};
+use super::super::initial_state::{InitialState, has_values_to_change, running};
 use super::super::interference::{Access, Annotations, Separations, TimedSeparations};
 use super::super::metric::{Metric, only_grows};
 use super::super::rules::stratified;
@@ -288,8 +288,12 @@ impl Builder<'_> {
         if has_rules {
             return;
         }
-        let ends =
-            compression::PositiveFacts::of(&self.actions, &self.snaps, timed, self.symbols.facts.len());
+        let ends = compression::PositiveFacts::of(
+            &self.actions,
+            &self.snaps,
+            timed,
+            self.symbols.facts.len(),
+        );
         for action in self.actions.iter_mut().filter(|action| action.end != NONE) {
             let makes = &self.separations[action.end as usize].makes;
             let is_plain = makes.iter().all(|&access| match access {
@@ -299,7 +303,8 @@ impl Builder<'_> {
                 Access::NeededTrue(_) | Access::NeededFalse(_) => true,
                 _ => !annotations.has(access),
             });
-            action.is_compression_safe = is_plain && ends.only_adds_positive_facts(action, &self.snaps);
+            action.is_compression_safe =
+                is_plain && ends.only_adds_positive_facts(action, &self.snaps);
         }
     }
 

@@ -10,8 +10,8 @@
 use std::collections::BTreeMap;
 
 use super::super::super::compile::{Action, Change, Compiled, NONE};
-use super::super::super::formula::Literal;
 use super::super::super::end_windows::EndWindows;
+use super::super::super::formula::Literal;
 use super::super::super::state::State;
 use super::super::super::time::{NEVER, Ticks};
 use super::actions::{least_ticks, most_ticks};

@@ -8,7 +8,7 @@ use rustdds::{GUID, Timestamp, WriteOptionsBuilder};
 use serde::Serialize;
 
 use super::super::session::now;
-use super::{RequestId, Framed, note_readers};
+use super::{Framed, RequestId, note_readers};
 
 /// Delay of an answer to a reader that has not been discovered. Then it is sent without waiting any longer.
 const DISCOVERY_TIMEOUT: Duration = Duration::from_secs(2);

@@ -48,7 +48,11 @@ impl Phase<'_> {
         for process in processes {
             self.refuse_derived_numbers(&process.condition, &process.name)?;
             let holds = (self.view(&self.now)).holds(&process.condition, ReadTime::At(&zero))?;
-            self.require_now(&process.condition, holds, &process_label(&process.name, holds))?;
+            self.require_now(
+                &process.condition,
+                holds,
+                &process_label(&process.name, holds),
+            )?;
             on.push(holds);
         }
         let mut tried = BTreeSet::new();

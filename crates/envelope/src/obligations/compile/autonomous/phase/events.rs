@@ -7,14 +7,18 @@ use elbowroom_model::problem::UpdateOperator;
 use elbowroom_num::Rational;
 
 use super::super::condition::ReadTime;
-use super::{Phase, Occurrence};
+use super::{Occurrence, Phase};
 use crate::linear::Linear;
 use crate::obligations::{Inequality, Refusal};
 
 impl Phase<'_> {
     /// Executes some events simultaneously, all in the same state; right after the moment, or at
     /// it.
-    pub(super) fn execute_simultaneously(&mut self, ready: &[usize], is_after: bool) -> Result<(), Refusal> {
+    pub(super) fn execute_simultaneously(
+        &mut self,
+        ready: &[usize],
+        is_after: bool,
+    ) -> Result<(), Refusal> {
         let events = &self.autonomous_of_task().events;
         for (position, &event) in ready.iter().enumerate() {
             let name = &events[event].name;

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use elbowroom_model::ground::Condition;
 use elbowroom_num::Rational;
 
-use super::super::condition::{StateView, ReadTime};
+use super::super::condition::{ReadTime, StateView};
 use super::Phase;
 use crate::linear::Linear;
 use crate::obligations::Refusal;

@@ -6,7 +6,7 @@ use elbowroom_model::Situation;
 use elbowroom_model::ground::{Change, FactId};
 
 use super::super::super::Calendar;
-use super::super::super::calendars::{DatedFact, nested_reads, extract_conditions};
+use super::super::super::calendars::{DatedFact, extract_conditions, nested_reads};
 use super::super::super::interference::Access;
 use super::super::Builder;
 use super::FutureTimed;
