@@ -114,7 +114,7 @@ pub enum Request {
         name: String,
         /// The goal, in the language of the domain.
         goal: String,
-        /// Its value and its deadline.
+        /// Its value, its times and its author.
         terms: GoalTerms,
     },
     /// Abandon the goal of this name.
@@ -133,7 +133,7 @@ pub enum Request {
     Resume,
 }
 
-/// Value and deadline of a goal.
+/// Kind, value, release time, deadline and author of a goal.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GoalTerms {
     /// A positive number: if not all goals can be reached together, those with the greatest sum of values are pursued.
@@ -141,14 +141,25 @@ pub struct GoalTerms {
     /// The time, on the run's clock, at which the goal fails unless it was achieved; `None` for no
     /// limit. Plans achieve it by then.
     pub deadline: Option<Rational>,
+    /// The time, on the run's clock, before which the goal is not pursued; `None` if it is pursued
+    /// at once.
+    pub release: Option<Rational>,
+    /// `true` for a condition that is achieved again whenever it does not hold. Such a goal has no
+    /// deadline, and is closed only when it is abandoned or replaced.
+    pub keep: bool,
+    /// Name of the client that has given the goal, if it is known.
+    pub by: Option<String>,
 }
 
 impl Default for GoalTerms {
-    /// A value of 1, and no deadline.
+    /// A value of 1, no times, and no author.
     fn default() -> Self {
         Self {
             value: Rational::ONE,
             deadline: None,
+            release: None,
+            keep: false,
+            by: None,
         }
     }
 }

@@ -21,6 +21,15 @@ pub enum GoalChange<'a> {
     },
     /// The goal is pursued again.
     Pursued,
+    /// The release time of the goal has come, and it is pursued.
+    Released,
+    /// The goal is to be kept, and holds.
+    Kept,
+    /// The goal is to be kept, does not hold, and is not pursued now.
+    Queued {
+        /// The reason.
+        why: &'a str,
+    },
     /// The goal is closed, and was not achieved by its deadline.
     Failed {
         /// The reason.
@@ -194,7 +203,7 @@ pub enum Entry<'a> {
         /// The change of the goals, or the reason for abandoning the plan.
         reason: &'a Reason,
     },
-    /// One of several goals of an executive is closed, set aside, or pursued again.
+    /// A goal of an executive is released, closed, set aside, or pursued again.
     Goal {
         /// The time.
         now: &'a Rational,

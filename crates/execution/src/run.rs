@@ -86,12 +86,14 @@ mod doubts;
 mod goal_selection;
 mod goals;
 mod history_pruning;
+mod kept_goals;
 mod mid_execution;
 mod observations;
 mod pending;
 mod persistent;
 mod plan_start;
 mod prediction;
+mod queued_goals;
 mod refusal_backoff;
 mod replanning;
 mod selection;
@@ -113,6 +115,7 @@ use elbowroom_model::{Footprint, Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::{Rational, work};
 
 pub use action_log::{ActionLog, ExecutedStep, KnownStart};
+pub use kept_goals::Wait;
 pub use mid_execution::{EntryPoint, MidExecutionStart};
 pub use observations::is_correction;
 pub use persistent::{GoalReader, PROBLEM_GOAL_NAME};
@@ -330,6 +333,7 @@ impl<'a> Run<'a> {
         self.check_stop_request()?;
         self.close_momentary_goals();
         self.close_achieved_goals();
+        self.tend_kept_goals();
         if self.poll_planner()? || self.handle_requests()? {
             return Ok(());
         }

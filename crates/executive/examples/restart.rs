@@ -56,6 +56,10 @@ fn first_run(journal: &Path) -> Result<(), Box<dyn Error>> {
             value: None,
             deadline: None,
             within: None,
+            release: None,
+            after: None,
+            keep: false,
+            by: None,
         };
         executive.submit_goal(home, Duration::from_secs(10))?;
         std::process::abort()

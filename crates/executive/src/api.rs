@@ -6,6 +6,7 @@ mod mutations;
 mod queries;
 mod router;
 mod server;
+mod state_stream;
 
 pub use initial_problem::{Client, GivenProblem, InitialProblem};
 pub use router::{ApiError, ApiRouter};

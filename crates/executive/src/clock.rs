@@ -21,6 +21,13 @@ impl Clock {
         Self(Instant::now())
     }
 
+    /// Starts the stopwatch. Returns a function that returns the time since then in seconds, rounded down to a
+    /// millisecond.
+    pub fn stopwatch() -> impl Fn() -> Rational {
+        let clock = Self::start();
+        move || clock.seconds()
+    }
+
     /// Returns the time since the start.
     pub fn elapsed(self) -> Duration {
         self.0.elapsed()

@@ -152,7 +152,7 @@ impl Executive {
         let text = fs::read_to_string(journal).map_err(|error| cannot(&error))?;
         match InterruptedRun::read(journal, &text, text.len() as u64)? {
             JournaledRun::Interrupted(run) => {
-                let names = GoalNames::after(run.goal_names());
+                let names = GoalNames::after(run.goal_names().iter().map(String::as_str));
                 let (spec, run) = (run.spec().clone(), Box::new(run.open_exclusively()?));
                 Self::with_start(spec, settings, Start::Resumed(run), names)
             }

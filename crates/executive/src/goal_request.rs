@@ -1,4 +1,4 @@
-//! Requests that add a goal: names, deadlines and values of [`NewGoal`].
+//! Requests that add a goal: names, times and values of [`NewGoal`].
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -26,12 +26,12 @@ impl GoalNames {
         Self(AtomicU64::new(last.unwrap_or_default()))
     }
 
-    /// Returns a name that no open goal has.
-    fn new_name(&self, open: &[String]) -> String {
+    /// Returns a name that no known goal has.
+    fn new_name(&self, is_known: impl Fn(&str) -> bool) -> String {
         loop {
             let number = self.0.fetch_add(1, Ordering::SeqCst) + 1;
             let name = format!("{PREFIX}{number}");
-            if !open.contains(&name) {
+            if !is_known(&name) {
                 return name;
             }
         }
@@ -40,47 +40,89 @@ impl GoalNames {
     /// Returns the name of a goal, and the request that adds it to a run with this status.
     ///
     /// # Errors
-    /// When the goal has two deadlines, or one that has passed.
+    /// When the goal has two deadlines or two release times, or a deadline that has passed or is not later than its
+    /// release time.
     pub(crate) fn request(
         &self,
         given: NewGoal,
         status: &Status,
     ) -> Result<(String, ExternalRequest), Error> {
+        check_times(&given, &status.state().now.0)?;
         let name = given.name;
-        let name = name.unwrap_or_else(|| self.new_name(&status.goals()));
+        let name = name.unwrap_or_else(|| self.new_name(|name| status.goal(name).is_some()));
         let goal = given.goal.trim().to_owned();
-        let value = given.value.map_or(Rational::ONE, |value| value.0);
-        let request = match (given.deadline, given.within) {
-            (Some(_), Some(_)) => {
-                let error = "the goal has a deadline and a time within which it is to be achieved";
-                return Err(Error::new(error, "leave out one of them"));
-            }
-            (Some(deadline), None) if deadline.0 <= status.state().now.0 => {
-                let now = status.state().now.0;
-                let late = (&now - &deadline.0).to_decimal(3);
-                let now = now.to_decimal(3);
-                return Err(Error::new(
-                    format!("the deadline has passed: it is {now}, {late} s later"),
-                    "give a later time, or the seconds from now (`within`)",
-                ));
-            }
-            (None, Some(within)) => ExternalRequest::GoalWithin {
-                name: name.clone(),
+        let terms = GoalTerms {
+            value: given.value.map_or(Rational::ONE, |value| value.0),
+            deadline: given.deadline.map(|it| it.0),
+            release: given.release.map(|it| it.0),
+            keep: given.keep,
+            by: given.by,
+        };
+        let (within, after) = (given.within.map(|it| it.0), given.after.map(|it| it.0));
+        let pursued = name.clone();
+        let request = if within.is_none() && after.is_none() {
+            ExternalRequest::Request(Request::Pursue {
+                name: pursued,
                 goal,
-                value,
-                within: within.0,
-            },
-            (deadline, None) => ExternalRequest::Request(Request::Pursue {
-                name: name.clone(),
+                terms,
+            })
+        } else {
+            ExternalRequest::TimedGoal {
+                name: pursued,
                 goal,
-                terms: GoalTerms {
-                    value,
-                    deadline: deadline.map(|it| it.0),
-                },
-            }),
+                terms,
+                within,
+                after,
+            }
         };
         Ok((name, request))
     }
+}
+
+/// Checks the times of a goal that is given at `now`.
+fn check_times(given: &NewGoal, now: &Rational) -> Result<(), Error> {
+    if given.keep && (given.deadline.is_some() || given.within.is_some()) {
+        return Err(Error::new(
+            "a goal to keep has a deadline",
+            "leave out the deadline, or achieve the goal once",
+        ));
+    }
+    let error = match (&given.deadline, &given.within, &given.release, &given.after) {
+        (Some(_), Some(_), ..) => {
+            "the goal has a deadline and a time within which it is to be achieved"
+        }
+        (.., Some(_), Some(_)) => {
+            "the goal has a release time and a time after which it is released"
+        }
+        (Some(_), _, _, Some(_)) | (_, Some(_), Some(_), _) => {
+            let error = "one of the deadline and the release time counts from now";
+            return Err(Error::new(
+                error,
+                "give both by the world's clock, or both from now",
+            ));
+        }
+        (Some(deadline), ..) if deadline.0 <= *now => {
+            let late = (now - &deadline.0).to_decimal(3);
+            return Err(Error::new(
+                format!(
+                    "the deadline has passed: it is {}, {late} s later",
+                    now.to_decimal(3)
+                ),
+                "give a later time, or the seconds from now (`within`)",
+            ));
+        }
+        (Some(deadline), _, Some(release), _) | (_, Some(deadline), _, Some(release))
+            if deadline.0 <= release.0 =>
+        {
+            let error = "the deadline is not later than the release time";
+            return Err(Error::new(
+                error,
+                "give a later deadline, or an earlier release time",
+            ));
+        }
+        _ => return Ok(()),
+    };
+    Err(Error::new(error, "leave out one of them"))
 }
 
 #[cfg(test)]
@@ -88,7 +130,7 @@ mod tests {
     use super::GoalNames;
 
     #[test]
-    fn names_differ_from_open_goals_and_earlier_names() {
+    fn names_differ_from_known_goals_and_earlier_names() {
         let earlier = [
             "goal-3",
             "home",
@@ -97,8 +139,8 @@ mod tests {
             "goal-1",
         ];
         let names = GoalNames::after(earlier.into_iter());
-        let open = ["goal-5".to_owned()];
-        assert_eq!(names.new_name(&open), "goal-4");
-        assert_eq!(names.new_name(&open), "goal-6");
+        let is_known = |name: &str| name == "goal-5";
+        assert_eq!(names.new_name(is_known), "goal-4");
+        assert_eq!(names.new_name(is_known), "goal-6");
     }
 }

@@ -7,12 +7,14 @@ use elbowroom::execution::run::RunSnapshot;
 use elbowroom::execution::{
     Command, Ending, Entry, Event, Observation, Recorder, TimeAdvance, World, WorldError,
 };
+use elbowroom::executive::Status;
 use elbowroom::model::Task;
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
 use elbowroom::report::trace::{Line, SnapshotLine, snapshot_text};
 
 use crate::journal::JournalFile;
+use crate::operator::OperatorInterface;
 use crate::request_queue::RequestQueue;
 
 /// Health of a journal, shared by its users.
@@ -36,23 +38,26 @@ pub struct JournalWriter<'a> {
     health: JournalHealth,
     /// Queue of requests that wait for a sync.
     queue: Option<RequestQueue>,
+    /// Published status, whose closed goals are carried over to new segments.
+    status: Option<Status>,
     /// `true` if commands were written since the last sync.
     has_commands: bool,
 }
 
 impl<'a> JournalWriter<'a> {
-    /// Creates a recorder that reports failures to `health` and to the queue.
+    /// Creates a recorder that reports failures to `health` and to the queue of the operators.
     pub fn new(
         task: &Arc<Task>,
         file: &'a mut JournalFile,
         health: &JournalHealth,
-        queue: Option<&RequestQueue>,
+        operator: &OperatorInterface,
     ) -> Self {
         Self {
             task: Arc::clone(task),
             file,
             health: health.clone(),
-            queue: queue.cloned(),
+            queue: operator.queue().cloned(),
+            status: operator.status().cloned(),
             has_commands: false,
         }
     }
@@ -93,8 +98,11 @@ impl Recorder for JournalWriter<'_> {
 
     fn begin_anew(&mut self, stand: &dyn Fn() -> RunSnapshot) -> bool {
         self.file.needs_rotation()
-            && SnapshotLine::of(&self.task, &stand())
-                .is_some_and(|snapshot| self.file.rotate(&snapshot_text(&snapshot)))
+            && SnapshotLine::of(&self.task, &stand()).is_some_and(|mut snapshot| {
+                let closed = self.status.as_ref().map(Status::closed_goals);
+                snapshot.closed = closed.unwrap_or_default();
+                self.file.rotate(&snapshot_text(&snapshot))
+            })
     }
 }
 

@@ -1,7 +1,7 @@
 //! Checks of operators' requests against the problem of a run, before the run receives them.
 
 use elbowroom::execute::{ill_typed_part, obstacle_to_deadline, read_goal};
-use elbowroom::execution::{ActionHandle, Request};
+use elbowroom::execution::{ActionHandle, GoalTerms, Request};
 use elbowroom::executive::Status;
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
@@ -11,6 +11,9 @@ use crate::request_queue::{ExternalRequest, RequestQueue};
 
 /// Limit on the name of a goal, in bytes.
 const MAX_NAME_LENGTH: usize = 64;
+
+/// Limit on the name of the client that gives a goal, in characters.
+const LONGEST_AUTHOR: usize = 64;
 
 /// Checks a request. Reading a goal or a fact can add facts to the table of `task`, so that it must not be the table
 /// of the run.
@@ -22,18 +25,20 @@ pub(crate) fn check(request: &ExternalRequest, task: &Task) -> Result<(), Error>
         ExternalRequest::Request(Request::Pursue { name, goal, terms }) => {
             check_goal(goal, terms.deadline.is_some(), task)?;
             check_name(name)?;
-            check_value(&terms.value)
+            check_terms(terms)
         }
-        ExternalRequest::GoalWithin {
+        ExternalRequest::TimedGoal {
             name,
             goal,
-            value,
+            terms,
             within,
+            after,
         } => {
-            check_goal(goal, true, task)?;
+            check_goal(goal, terms.deadline.is_some() || within.is_some(), task)?;
             check_name(name)?;
-            check_value(value)?;
-            check_within(within)
+            check_terms(terms)?;
+            check_seconds(within.as_ref(), "within which the goal is to be achieved")?;
+            check_seconds(after.as_ref(), "after which the goal is released")
         }
         ExternalRequest::Request(
             Request::Abandon { .. }
@@ -130,22 +135,33 @@ fn check_name(name: &str) -> Result<(), Error> {
     Ok(())
 }
 
-fn check_value(value: &Rational) -> Result<(), Error> {
-    if value.is_positive() {
+fn check_terms(terms: &GoalTerms) -> Result<(), Error> {
+    if !terms.value.is_positive() {
+        return Err(Error::new(
+            "the value of a goal is not positive",
+            "give a positive number, such as 2.5",
+        ));
+    }
+    let is_author = |by: &String| {
+        let count = by.chars().count();
+        (1..=LONGEST_AUTHOR).contains(&count) && !by.contains(char::is_control)
+    };
+    if terms.by.as_ref().is_none_or(is_author) {
         return Ok(());
     }
     Err(Error::new(
-        "the value of a goal is not positive",
-        "give a positive number, such as 2.5",
+        "this is no name of a client",
+        "use 1 to 64 characters on one line",
     ))
 }
 
-fn check_within(within: &Rational) -> Result<(), Error> {
-    if within.is_positive() {
+/// Checks a time from now; `role` describes it.
+fn check_seconds(seconds: Option<&Rational>, role: &str) -> Result<(), Error> {
+    if seconds.is_none_or(Rational::is_positive) {
         return Ok(());
     }
     Err(Error::new(
-        "the time within which the goal is to be achieved is not positive",
+        format!("the time {role} is not positive"),
         "give the seconds from now, such as 60",
     ))
 }

@@ -22,16 +22,18 @@ const SILENCE_THRESHOLD: Duration = Duration::from_secs(1);
 pub enum ExternalRequest {
     /// Request about goals or dispatching.
     Request(Request),
-    /// Goal with a deadline that counts from the time at which the run receives it.
-    GoalWithin {
+    /// Goal with times that count from the time at which the run receives it.
+    TimedGoal {
         /// Name of the goal.
         name: String,
         /// The goal in PDDL.
         goal: String,
-        /// Its value, a positive number.
-        value: Rational,
+        /// Its value, its author, and its other times.
+        terms: GoalTerms,
         /// Time until its deadline, in seconds.
-        within: Rational,
+        within: Option<Rational>,
+        /// Time until its release, in seconds.
+        after: Option<Rational>,
     },
     /// Observation of a fact.
     Fact {
@@ -93,6 +95,8 @@ struct State {
     has_run_ended: bool,
     /// Runs since the pending question to the world, if there is one.
     since_question: Option<Clock>,
+    /// The reason why the world's program is being started again.
+    restart: Option<String>,
 }
 
 impl RequestQueue {
@@ -168,17 +172,19 @@ impl RequestQueue {
         };
         let events = requests.into_iter().filter_map(|request| match request {
             ExternalRequest::Request(request) => Some(Event::Asked(request)),
-            ExternalRequest::GoalWithin {
+            ExternalRequest::TimedGoal {
                 name,
                 goal,
-                value,
+                terms,
                 within,
+                after,
             } => Some(Event::Asked(Request::Pursue {
                 name,
                 goal,
                 terms: GoalTerms {
-                    value,
-                    deadline: Some(now + &within),
+                    deadline: within.map(|it| now + &it).or(terms.deadline),
+                    release: after.map(|it| now + &it).or(terms.release),
+                    ..terms
                 },
             })),
             ExternalRequest::Fact { fact, becomes } => Some(Event::Fact {
@@ -234,6 +240,16 @@ impl RequestQueue {
     /// Returns the time since the pending question to the world, or `None` if there is none.
     pub fn unanswered(&self) -> Option<Duration> {
         self.lock().since_question.map(Clock::elapsed)
+    }
+
+    /// Records why the world's program is being started again, or that it runs.
+    pub fn note_restart(&self, why: Option<String>) {
+        self.lock().restart = why;
+    }
+
+    /// Returns the reason why the world's program is being started again, or `None` if it runs.
+    pub fn world_restart(&self) -> Option<String> {
+        self.lock().restart.clone()
     }
 
     /// Returns the time in seconds for which the world has not answered, if that is more than one second. An interactive

@@ -203,17 +203,28 @@ impl<'a> RestartableWorld<'a> {
             }
             let delay = INITIAL_DELAY.saturating_mul(1 << self.restarts.min(16));
             self.restarts += 1;
-            self.launch.warnings.warn(&format!(
+            let words = format!(
                 "{}; the world is started again (restart {} of {})",
                 failure.message, self.restarts, self.launch.limits.restarts
-            ));
+            );
+            self.launch.warnings.warn(&words);
+            self.note_restart(Some(words));
             self.pause(delay.min(MAX_DELAY));
-            match self.world() {
-                Ok(_) => return Ok(()),
+            let restarted = self.world().map(|_| ());
+            self.note_restart(None);
+            match restarted {
+                Ok(()) => return Ok(()),
                 Err(error) => failure = error,
             }
         }
         Err(failure)
+    }
+
+    /// Reports a restart to operators, or its end.
+    fn note_restart(&self, why: Option<String>) {
+        if let Some(queue) = &self.launch.queue {
+            queue.note_restart(why);
+        }
     }
 
     /// Waits by the wall clock, unless the run is to stop.

@@ -22,7 +22,7 @@ use elbowroom::model::Task;
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
 use elbowroom::report::trace::schema::ObservationLine;
-use elbowroom::report::trace::{Line, ReplayWorld, Stored};
+use elbowroom::report::trace::{Line, ReplayWorld, SnapshotLine, Stored};
 use serde_json::Value;
 
 use crate::background_planner::{BackgroundPlanner, BackgroundSettings};
@@ -151,16 +151,19 @@ impl InterruptedRun {
     }
 
     /// Returns the names of the goals that were given to the run.
-    pub(crate) fn goal_names(&self) -> impl Iterator<Item = &str> {
+    pub(crate) fn goal_names(&self) -> Vec<String> {
+        let snapshot = self.stored.snapshot().ok().flatten();
+        let earlier = snapshot.iter().flat_map(SnapshotLine::goal_names);
         let lines = self.stored.lines.iter().filter_map(|line| match line {
             Line::Passed(line) => Some(&line.observations),
             Line::Looked(line) => Some(&line.observations),
             _ => None,
         });
-        lines.flatten().filter_map(|line| match line {
+        let given = lines.flatten().filter_map(|line| match line {
             ObservationLine::Goal { name, .. } => Some(name.as_str()),
             _ => None,
-        })
+        });
+        earlier.chain(given).map(str::to_owned).collect()
     }
 
     /// Opens the journal, so that no other program resumes the run. [`InterruptedRun::resume`] does so otherwise.
@@ -234,11 +237,10 @@ impl InterruptedRun {
             let recorder = ReplayRecorder {
                 replay: Arc::clone(&replay),
                 task: Arc::clone(task),
-                writer: JournalWriter::new(task, &mut file, &health, operator.queue()),
+                writer: JournalWriter::new(task, &mut file, &health, &operator),
             };
             let recorder = operator.publishing(recorder, task, true);
-            let begun = Clock::start();
-            let clock = || begun.seconds();
+            let clock = Clock::stopwatch();
             let continues = || !stop.is_requested();
             let model = spec.beliefs(task.problem()).map_err(SpecError::World)?;
             let planner = spec.planner_for(task, model.as_ref(), &clock, &continues)?;
@@ -258,6 +260,7 @@ impl InterruptedRun {
                 limits,
                 stop: stop.clone(),
                 warnings,
+                queue: operator.queue().cloned(),
             };
             let running = RunningActions::of(&stored, snapshot.as_ref());
             let elapsed = Box::new(move || elapsed.until(WallTime::now()));

@@ -202,7 +202,7 @@ impl<'a> RunInputs<'a> {
         let mut world = self.interactive(world, &Rational::ONE);
         host.started();
         let outcome = {
-            let writer = JournalWriter::new(task, &mut file, &health, self.operator.queue());
+            let writer = JournalWriter::new(task, &mut file, &health, self.operator);
             let writer = self.operator.publishing(writer, task, true);
             let mut writer = ViewedRecorder::new(writer, task, buffer, self.observer.take());
             let mut watcher = JournalWatcher {
@@ -226,6 +226,7 @@ impl<'a> RunInputs<'a> {
             limits: self.limits.clone(),
             stop: self.background.stop.clone(),
             warnings: self.warnings.clone(),
+            queue: self.operator.queue().cloned(),
         })
     }
 
@@ -242,8 +243,7 @@ impl<'a> RunInputs<'a> {
         mut listener: impl FnMut(&BeliefState) + Send,
         watcher: &mut (dyn Observer + Send),
     ) -> Result<RunOutcome, SpecError> {
-        let begun = Clock::start();
-        let clock = || begun.seconds();
+        let clock = Clock::stopwatch();
         let continues = || !self.background.stop.is_requested();
         let model = self.spec.beliefs(self.task.problem());
         let model = model.map_err(SpecError::World)?;

@@ -217,12 +217,8 @@ impl TraceBuffer {
     /// Returns the lines after line `sent`, without their line feeds. Waits for at most `timeout` if there are none and
     /// the run continues.
     pub fn lines_after(&self, sent: usize, timeout: Duration) -> NewLines {
-        let waits = |state: &mut State| state.lines() <= sent && !state.is_finished;
-        let waited = self
-            .0
-            .changed
-            .wait_timeout_while(self.lock(), timeout, waits);
-        let (state, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        self.wait_for_lines(sent, timeout);
+        let state = self.lock();
         let (news, missed) = state.after(sent.min(state.lines()));
         NewLines {
             lines: news
@@ -233,6 +229,18 @@ impl TraceBuffer {
             last: state.lines(),
             is_finished: state.is_finished,
         }
+    }
+
+    /// Waits until there are more than `seen` lines or the run ends, for at most `timeout`. Returns the number of lines,
+    /// and `true` if the run has ended.
+    pub(crate) fn wait_for_lines(&self, seen: usize, timeout: Duration) -> (usize, bool) {
+        let waits = |state: &mut State| state.lines() <= seen && !state.is_finished;
+        let waited = self
+            .0
+            .changed
+            .wait_timeout_while(self.lock(), timeout, waits);
+        let (state, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        (state.lines(), state.is_finished)
     }
 
     /// Sends an event for each change, until the run ends or the client disconnects.
@@ -256,7 +264,11 @@ impl TraceBuffer {
         self.with_listener_count(|| self.stream_all_lines(after, client))
     }
 
-    fn with_listener_count(&self, stream: impl FnOnce() -> io::Result<()>) -> io::Result<()> {
+    /// Counts a client while it reads a stream.
+    pub(crate) fn with_listener_count(
+        &self,
+        stream: impl FnOnce() -> io::Result<()>,
+    ) -> io::Result<()> {
         self.lock().listeners += 1;
         let streamed = stream();
         self.lock().listeners -= 1;

@@ -13,6 +13,7 @@ use crate::belief_updates::BeliefUpdates;
 use crate::embedded_world::EmbeddedWorld;
 use crate::error::{Error, WarningSink};
 use crate::process_world::{ProcessLimits, ProcessWorld};
+use crate::request_queue::RequestQueue;
 use crate::running_actions::RunningActions;
 
 /// Arguments for a connection to the world.
@@ -22,6 +23,8 @@ pub(crate) struct Launch<'a> {
     pub(crate) limits: ProcessLimits,
     pub(crate) stop: Stop,
     pub(crate) warnings: WarningSink,
+    /// Queue that reports restarts of the world to operators.
+    pub(crate) queue: Option<RequestQueue>,
 }
 
 /// Source of a world.

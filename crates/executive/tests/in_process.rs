@@ -229,6 +229,10 @@ fn run_in_failed_world_is_resumed_in_another_one() {
             value: None,
             deadline: None,
             within: None,
+            release: None,
+            after: None,
+            keep: false,
+            by: None,
         };
         let (name, status) = resumed.submit_goal(home, LONG).expect("a correct goal");
         assert_eq!((name.as_str(), status), ("goal-1", RequestStatus::Accepted));

@@ -74,6 +74,27 @@ pub(crate) fn lanes<'a>(
     lanes
 }
 
+/// Returns the lane of each of these actions in the initial grouping, by name. An action has its name, start and end.
+/// `type_of` returns the type of an object.
+pub fn lanes_of_actions<'a, 't>(
+    actions: &[(&'a str, (f64, f64))],
+    type_of: &dyn Fn(&str) -> Option<&'t str>,
+) -> BTreeMap<&'a str, String> {
+    let occupants: Vec<Occupant<'_>> = actions
+        .iter()
+        .map(|&(name, time)| Occupant {
+            name,
+            time,
+            counts: true,
+        })
+        .collect();
+    let lanes = lanes(&occupants, type_of);
+    let grouping = &lanes.groupings[lanes.chosen].lanes;
+    let lane = |of: &Vec<usize>| grouping[of[lanes.chosen]].clone();
+    let names = actions.iter().map(|(name, _)| *name);
+    names.zip(lanes.of.iter().map(lane)).collect()
+}
+
 impl Lanes {
     fn add(&mut self, name: String, keys: &[Option<&str>]) {
         let mut positions: BTreeMap<&str, usize> = BTreeMap::new();

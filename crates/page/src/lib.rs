@@ -13,6 +13,7 @@
 //! - `plan`, `region`, `run`, `experiment`, `perturbed`: from answers, traces and results to
 //!   documents.
 //! - `lanes`: assignment of actions to the lanes of a chart.
+//! - `operator`: the page of an executive for its operator.
 //! - `html`: the document as a file.
 //! - `perfetto`, `mcap`: a run for other viewers.
 //!
@@ -37,6 +38,7 @@ mod experiment;
 mod html;
 mod lanes;
 mod mcap;
+mod operator;
 mod perfetto;
 mod perturbed;
 mod plan;
@@ -54,6 +56,9 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use document::Document;
+
+pub use lanes::lanes_of_actions;
+pub use operator::operator_page;
 
 /// Error of the conversion of a text to a page.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

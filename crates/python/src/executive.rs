@@ -122,6 +122,10 @@ impl Executive {
         value: Option<&str>,
         deadline: Option<&str>,
         within: Option<&str>,
+        release: Option<&str>,
+        after: Option<&str>,
+        keep: bool,
+        by: Option<String>,
         timeout: f64,
     ) -> PyResult<(String, &'static str)> {
         run_without_gil(py, || {
@@ -135,6 +139,10 @@ impl Executive {
                 value: given(value, "value")?,
                 deadline: given(deadline, "deadline")?,
                 within: given(within, "within")?,
+                release: given(release, "release")?,
+                after: given(after, "after")?,
+                keep,
+                by,
             };
             let submitted = self.inner.submit_goal(goal, duration(timeout)?);
             let (name, status) = submitted.map_err(refused)?;

@@ -104,6 +104,14 @@ def test_deadline_that_passes_fails_the_goal() -> None:
         assert executive.wait(executive.submit(HOME, deadline=now + 1000), HANG)
 
 
+def test_goal_is_not_achieved_before_its_release_time() -> None:
+    with Executive(*CASE, world=Depot()) as executive:
+        executive.wait("problem", HANG)
+        goal = executive.wait(executive.submit(HOME, after=5, by="night shift"), HANG)
+        assert goal and goal.release is not None and goal.since >= goal.release
+        assert goal.by == "night shift"
+
+
 @pytest.mark.parametrize(
     ("goal", "options", "words"),
     [
@@ -116,6 +124,9 @@ def test_deadline_that_passes_fails_the_goal() -> None:
         (HOME, {"within": -1}, "not positive"),
         (HOME, {"deadline": 0}, "has passed"),
         (HOME, {"deadline": 900, "within": 5}, "leave out one"),
+        (HOME, {"after": 0}, "not positive"),
+        (HOME, {"release": 900, "within": 5}, "give both"),
+        (HOME, {"by": ""}, "no name of a client"),
     ],
 )
 def test_wrong_goals_are_refused(goal: str, options: dict[str, Any], words: str) -> None:

@@ -10,8 +10,7 @@ mod goal;
 mod observed;
 mod shortfall;
 
-pub(crate) use goal::members;
-pub use goal::{GoalChangeLine, GoalState, terms};
+pub use goal::{GoalChangeLine, GoalState, TermsLine};
 pub use observed::{ObservationLine, ObservedLine};
 pub use shortfall::{LatenessLine, ShortfallLine};
 
@@ -42,7 +41,7 @@ pub enum Line {
     Warning(WarningLine),
     /// The goals have changed, and the rest of the plan is kept.
     Kept(KeptPlanLine),
-    /// A goal is closed, set aside, or pursued again.
+    /// A goal is released, closed, set aside, or pursued again.
     Goal(GoalChangeLine),
     /// A persistent run is idle.
     Resting(IdleLine),

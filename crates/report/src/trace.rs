@@ -20,8 +20,8 @@ pub use replay::{
     Difference, Replay, ReplayPlanner, ReplayPreparer, ReplayWorld, Stored, TraceError,
 };
 pub use snapshot::{
-    GoalLine, NewsLine, PendingGoalChangeLine, PlanAdoptionLine, RunningActionLine,
-    SituationActionLine, SnapshotLine, StartLine,
+    ClosedGoalLine, GoalLine, NewsLine, PendingGoalChangeLine, PlanAdoptionLine, RunningActionLine,
+    SituationActionLine, SnapshotLine, StartLine, WaitLine,
 };
 
 /// The value of `format` in the first line of a trace.

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
-use elbowroom_execution::run::{GoalReader, PROBLEM_GOAL_NAME, RunSnapshot, Verdict};
+use elbowroom_execution::run::{GivenGoal, GoalReader, PROBLEM_GOAL_NAME, RunSnapshot, Verdict};
 use elbowroom_execution::{
     ActionHandle, BeliefState, Command, Ending, Entry, Event, GoalChange, Measured, Observation,
     Request,
@@ -115,6 +115,10 @@ struct Goal {
     name: String,
     condition: Condition,
     deadline: Option<Rational>,
+    /// `true` until its release time, and for a goal to keep that is not pursued.
+    is_queued: bool,
+    /// `true` if it is to be kept.
+    is_to_keep: bool,
 }
 
 /// A start that was commanded.
@@ -134,6 +138,8 @@ impl<'a> Validation<'a> {
             name: PROBLEM_GOAL_NAME.to_owned(),
             condition: task.goal().clone(),
             deadline: None,
+            is_queued: false,
+            is_to_keep: false,
         };
         let goals = Some(goal).filter(|goal| !goal.condition.is_trivial());
         Self {
@@ -153,20 +159,12 @@ impl<'a> Validation<'a> {
     #[must_use]
     pub fn resume_from(mut self, stand: &RunSnapshot) -> Self {
         if stand.goals.are_changed {
-            let task = Arc::clone(&self.task);
             let open = stand.goals.open.iter();
-            let read = open.filter_map(|given| {
-                Some(Goal {
-                    name: given.name.clone(),
-                    condition: match &given.text {
-                        None => task.goal().clone(),
-                        Some(text) => self.read(text)?,
-                    },
-                    deadline: given.terms.deadline.clone(),
-                })
-            });
-            self.goals = read.collect();
+            self.goals = open.filter_map(|it| self.goal(it, false)).collect();
         }
+        let queued = stand.queued.iter();
+        let queued: Vec<Goal> = queued.filter_map(|it| self.goal(it, true)).collect();
+        self.goals.extend(queued);
         let (situation, running) = situation(&stand.belief);
         let numbers: Vec<u64> = running.iter().map(|ticket| ticket.0).collect();
         self.execution = Execution::from(&self.task, &situation, &numbers);
@@ -379,6 +377,9 @@ impl<'a> Validation<'a> {
                     name: name.clone(),
                     condition,
                     deadline: terms.deadline.clone(),
+                    is_queued: terms.keep
+                        || terms.release.as_ref().is_some_and(|it| *it > self.now),
+                    is_to_keep: terms.keep,
                 };
                 match self.goals.iter_mut().find(|known| known.name == *name) {
                     Some(known) => *known = given,
@@ -390,6 +391,20 @@ impl<'a> Validation<'a> {
         }
     }
 
+    /// Returns a goal of a snapshot.
+    fn goal(&self, given: &GivenGoal, is_queued: bool) -> Option<Goal> {
+        Some(Goal {
+            name: given.name.clone(),
+            condition: match &given.text {
+                None => self.task.goal().clone(),
+                Some(text) => self.read(text)?,
+            },
+            deadline: given.terms.deadline.clone(),
+            is_queued,
+            is_to_keep: given.terms.keep,
+        })
+    }
+
     fn read(&self, goal: &str) -> Option<Condition> {
         let condition = self.reader.read(&self.task, goal).ok()?;
         Some(self.task.with_goal(condition).goal().clone())
@@ -397,14 +412,30 @@ impl<'a> Validation<'a> {
 
     /// Compares a change of a goal with the state.
     fn change_goal(&mut self, name: &str, change: GoalChange<'_>) {
-        let closes = match change {
-            GoalChange::Achieved | GoalChange::Failed { .. } => true,
-            GoalChange::SetAside { .. } | GoalChange::Pursued => false,
-        };
-        let index = self.goals.iter().position(|known| known.name == name);
-        let Some(index) = index.filter(|_| closes) else {
+        let Some(index) = self.goals.iter().position(|known| known.name == name) else {
             return;
         };
+        match change {
+            GoalChange::Achieved | GoalChange::Failed { .. } => {}
+            GoalChange::SetAside { .. } => return,
+            GoalChange::Pursued | GoalChange::Released => {
+                self.goals[index].is_queued = false;
+                return;
+            }
+            GoalChange::Queued { .. } | GoalChange::Kept => {
+                self.goals[index].is_queued = true;
+                let goals = [&self.goals[index].condition];
+                let unmet = match change {
+                    GoalChange::Kept => self.unmet(goals, Execution::holds),
+                    _ => Vec::new(),
+                };
+                if !unmet.is_empty() {
+                    let time = self.now.clone();
+                    self.record_finding(Invalid::NotReached { time, unmet });
+                }
+                return;
+            }
+        }
         let goal = self.goals.remove(index);
         let time = self.now.clone();
         if change != GoalChange::Achieved {
@@ -437,11 +468,17 @@ impl<'a> Validation<'a> {
         let time = self.now.clone();
         match verdict {
             Verdict::GoalReached => {
-                let goals = std::mem::take(&mut self.goals);
+                let is_open = |goal: &mut Goal| !goal.is_queued;
+                let goals: Vec<Goal> = self.goals.extract_if(.., is_open).collect();
                 let unmet = self.unmet(
                     goals.iter().map(|goal| &goal.condition),
                     Execution::reaches_goal,
                 );
+                let kept = goals.into_iter().filter(|goal| goal.is_to_keep);
+                self.goals.extend(kept.map(|goal| Goal {
+                    is_queued: true,
+                    ..goal
+                }));
                 if !unmet.is_empty() {
                     self.record_finding(Invalid::NotReached { time, unmet });
                 } else if !self.execution.is_idle() {
@@ -449,10 +486,11 @@ impl<'a> Validation<'a> {
                 }
             }
             Verdict::Unsolvable => {
-                let mut goals = self.goals.iter();
+                let mut goals = self.goals.iter().filter(|goal| !goal.is_queued).peekable();
+                let has_goals = goals.peek().is_some();
                 let holds =
                     goals.all(|goal| self.execution.reaches_goal(&goal.condition) == Some(true));
-                if holds && !self.goals.is_empty() && self.execution.is_idle() {
+                if holds && has_goals && self.execution.is_idle() {
                     self.record_finding(Invalid::Reached { time });
                 }
             }

@@ -136,6 +136,24 @@ pub(crate) enum CtlCommand {
         /// The deadline in seconds from now
         #[arg(long, value_name = "S", allow_negative_numbers = true)]
         within: Option<Rational>,
+        /// Release time on the world's clock: the goal is queued until then, and not planned for
+        #[arg(
+            long,
+            value_name = "T",
+            conflicts_with = "after",
+            allow_negative_numbers = true
+        )]
+        release: Option<Rational>,
+        /// The release time in seconds from now
+        #[arg(long, value_name = "S", allow_negative_numbers = true)]
+        after: Option<Rational>,
+        /// Keep the goal: achieve it again whenever it does not hold and no other goal is pursued,
+        /// until it is cancelled
+        #[arg(long, conflicts_with_all = ["deadline", "within"])]
+        keep: bool,
+        /// Name of the client that gives the goal, for the records
+        #[arg(long, value_name = "NAME")]
+        by: Option<String>,
         /// Wait until the goal is closed, or impossible from where the executive rests: exit code 0 if it is achieved, 1
         /// if it is cancelled, failed or impossible, 3 if the executive rests because no plan was found
         #[arg(long)]

@@ -46,6 +46,10 @@ pub(crate) fn run(arguments: &CtlArgs, output: &mut Output) -> Answer {
             value,
             deadline,
             within,
+            release,
+            after,
+            keep,
+            by,
             wait,
         } => {
             let new = NewGoal {
@@ -54,6 +58,10 @@ pub(crate) fn run(arguments: &CtlArgs, output: &mut Output) -> Answer {
                 value: value.clone().map(GivenNumber),
                 deadline: deadline.clone().map(GivenNumber),
                 within: within.clone().map(GivenNumber),
+                release: release.clone().map(GivenNumber),
+                after: after.clone().map(GivenNumber),
+                keep: *keep,
+                by: by.clone(),
             };
             if *wait {
                 return client.submit_goal_and_wait(output, &new);
@@ -248,7 +256,7 @@ impl Client<'_> {
                 continue;
             };
             let exit = match goal.state.as_str() {
-                "achieved" => Exit::Yes,
+                "achieved" | "kept" => Exit::Yes,
                 "cancelled" | "failed" | "impossible" => Exit::No,
                 "unplanned" => Exit::Limit,
                 _ => {
@@ -306,10 +314,18 @@ fn goals(goals: &GoalsNow) -> String {
             value if *value == Rational::ONE => String::new(),
             value => format!(", value {}", nearest(value)),
         };
-        let by = goal.deadline.as_ref();
-        let by = by.map_or(String::new(), |by| format!(", by {}", nearest(&by.0)));
+        let time = |word: &str, time: &Option<Exact>| {
+            let time = time.as_ref();
+            time.map_or(String::new(), |it| format!(", {word} {}", nearest(&it.0)))
+        };
+        let (from, until) = (time("from", &goal.release), time("by", &goal.deadline));
+        let keep = if goal.keep { ", to be kept" } else { "" };
+        let author = goal.by.as_ref();
+        let author = author.map_or(String::new(), |it| {
+            format!(", given by {}", escape_control(it))
+        });
         let mut line = format!(
-            "{name}{value}{by}: {state} since {since}: {}",
+            "{name}{value}{from}{until}{keep}{author}: {state} since {since}: {}",
             escape_control(&goal.goal)
         );
         if let Some(why) = &goal.why {
@@ -334,6 +350,10 @@ fn state(state: &State) -> String {
         let _ = write!(text, ": {}", escape_control(why));
     }
     text.push('\n');
+    if let Some(why) = &state.restarting {
+        let why = format!("world restarting: {}", escape_control(why));
+        let _ = writeln!(text, "{}", wrap(&why, TextLayout::of_stdout().width, 2));
+    }
     if let Some(seconds) = state.unanswered {
         let why = format!(
             "the world has not answered for {seconds} s: nothing is started, and no request taken in, until it does"
@@ -346,7 +366,13 @@ fn state(state: &State) -> String {
         let aside = aside.map_or(String::new(), |why| {
             format!("; set aside: {}", escape_control(why))
         });
-        let _ = writeln!(text, "  goal {name}: {pddl}{aside}");
+        let release = goal.release.as_ref();
+        let release = release.map_or(String::new(), |it| {
+            format!("; queued until {}", nearest(&it.0))
+        });
+        let keep = goal.keep.as_ref();
+        let keep = keep.map_or(String::new(), |state| format!("; to be kept, {state}"));
+        let _ = writeln!(text, "  goal {name}: {pddl}{aside}{keep}{release}");
     }
     for running in &state.running {
         let _ = write!(

@@ -226,10 +226,10 @@ impl Executive {
         Some((status, serde_json::from_str(text).ok()?))
     }
 
-    /// Returns the current response at the address of the page, with its status.
+    /// Returns the current response at the address of the page of the run, with its status.
     pub(crate) fn page_now(&self) -> (u16, String) {
         let stream = TcpStream::connect(self.address()).expect("it listens");
-        said(stream, "GET", "/", None, "")
+        said(stream, "GET", "/run", None, "")
     }
 
     /// Waits for the page, which exists once the executive has accepted the problem.

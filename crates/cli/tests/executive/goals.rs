@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use super::client::{Executive, folder};
-use super::{ctl, simulated};
+use super::{command, ctl, python_is_there, simulated, with_robot};
 
 /// Submits a goal with `ctl goal --wait`. Returns the exit code and the state of the goal.
 fn wait_for(own: &Executive, name: &str, goal: &str) -> (Option<i32>, Value) {
@@ -87,6 +87,140 @@ fn goals_with_deadlines_are_achieved_or_fail() {
         assert_eq!(told.status.code(), Some(code), "{text}");
         assert_eq!(answer["state"], state, "{text}");
     }
+}
+
+#[test]
+fn goals_with_release_times_are_queued_until_then() {
+    let own = simulated("released");
+    own.await_state(|state| state["activity"] == "resting");
+    for (wrong, words) in [
+        (json!({"after": 0}), "is not positive"),
+        (
+            json!({"after": 5, "release": 1_000_000}),
+            "leave out one of them",
+        ),
+        (json!({"after": 5, "deadline": 1_000_000}), "give both"),
+        (
+            json!({"after": 5, "within": 5}),
+            "not later than the release time",
+        ),
+        (
+            json!({"release": 1e6, "deadline": 1e6}),
+            "not later than the release time",
+        ),
+        (json!({"release": "soon"}), "number"),
+        (json!({"by": ""}), "no name of a client"),
+        (json!({"by": "a\nb"}), "no name of a client"),
+    ] {
+        let mut goal = wrong.clone();
+        goal["goal"] = json!("(done b2)");
+        let (status, refusal) = own.post("/v1/goals", &goal);
+        assert_eq!(status, 422, "{wrong}: {refusal}");
+        assert!(refusal.to_string().contains(words), "{wrong}: {refusal}");
+    }
+    let (token, address) = (own.token(), own.address());
+    let executive = ["--token", &token, "--to", &address];
+    let later = [
+        "goal",
+        "(not (open a1))",
+        "--name",
+        "later",
+        "--release",
+        "1000000",
+        "--by",
+        "ward 3",
+    ];
+    let told = ctl(&[&executive[..], &later].concat());
+    assert_eq!(told.status.code(), Some(0), "{told:?}");
+    let (status, goal) = own.get("/v1/goals/later");
+    assert_eq!((status, &goal["state"]), (200, &json!("queued")), "{goal}");
+    assert_eq!(goal["release"]["exact"], "1000000", "{goal}");
+    assert_eq!(goal["by"], "ward 3", "{goal}");
+    let gone = json!({"goal": "(not (open a1))", "name": "gone"});
+    assert_eq!(own.post("/v1/goals", &gone).0, 200);
+    assert_eq!(own.delete("/v1/goals/gone").0, 200);
+    own.await_state(|state| state["why"] == "the next goal is released at 1000000");
+    let shown = |command: &str| {
+        let told = ctl(&[&executive[..], &[command]].concat());
+        String::from_utf8_lossy(&told.stdout).replace("\n  ", " ")
+    };
+    let words = "later, from 1000000, given by ward 3: queued since";
+    assert!(shown("goals").contains(words), "{}", shown("goals"));
+    assert!(
+        shown("state").contains("; queued until 1000000"),
+        "{}",
+        shown("state")
+    );
+    let soon = [
+        "goal",
+        "(done b2)",
+        "--name",
+        "soon",
+        "--after",
+        "0.5",
+        "--wait",
+        "--json",
+    ];
+    let told = ctl(&[&executive[..], &soon].concat());
+    assert_eq!(told.status.code(), Some(0), "{told:?}");
+    let goal: Value = serde_json::from_slice(&told.stdout).expect("a document");
+    assert_eq!(goal["state"], "achieved", "{goal}");
+    let lines = own.trace_lines();
+    let released = lines.iter().find(|it| it["becomes"] == "released");
+    assert_eq!(released.expect("a line")["name"], "soon");
+    let given = lines.iter().filter_map(|it| it["observations"].as_array());
+    let given = given.flatten().find(|it| it["name"] == "later");
+    assert_eq!(given.expect("an observation")["by"], "ward 3");
+    assert_eq!(own.get("/v1/goals/none").0, 404);
+    assert_eq!(own.delete("/v1/goals/later").0, 200);
+    let (_, goal) = own.get("/v1/goals/later");
+    assert_eq!(goal["state"], "cancelled", "{goal}");
+}
+
+/// Goals that were closed before a rotation of the journal are listed after a crash.
+#[test]
+fn closed_and_queued_goals_survive_rotation_and_crash() {
+    if !python_is_there() {
+        return;
+    }
+    let place = folder("closed-goals");
+    let journal = place.join("journal").display().to_string();
+    let line = with_robot(&place, &journal);
+    let line: Vec<&str> = line.iter().map(String::as_str).collect();
+    let mut own = Executive::start(&place, &[&line[..], &["--journal-size", "1K"]].concat());
+    own.await_state(|state| state["why"] == "reached: problem");
+    let later = json!({"name": "later", "goal": "(done a1)", "after": 1_000_000, "by": "night"});
+    assert_eq!(own.post("/v1/goals", &later).0, 200);
+    let is_carried_over = || {
+        let text = std::fs::read_to_string(&journal).expect("a journal");
+        let second = text.lines().nth(1).unwrap_or_default();
+        second.contains("\"closed\"") && second.contains("\"problem\"") && second.contains("night")
+    };
+    for number in 0.. {
+        // The journal is rotated when its length has doubled.
+        assert!(number < 200, "the journal is not rotated");
+        let goal = json!({"name": format!("more-{number}"), "goal": "(done a2)"});
+        assert_eq!(own.post("/v1/goals", &goal).0, 200);
+        own.await_state(|state| state["goals"].as_array().is_some_and(|it| it.len() == 1));
+        if is_carried_over() {
+            break;
+        }
+    }
+    let before = own.get("/v1/goals/problem");
+    assert_eq!(before.1["state"], "achieved", "{before:?}");
+    own.kill();
+    let own = Executive::start(&place, &["--resume", &journal]);
+    own.await_state(|state| state["activity"] == "resting");
+    assert_eq!(own.get("/v1/goals/problem"), before);
+    let (_, goal) = own.get("/v1/goals/later");
+    assert_eq!(
+        (&goal["state"], &goal["by"]),
+        (&json!("queued"), &json!("night")),
+        "{goal}"
+    );
+    let replayed = command::elbowroom(&["run", "--replay", &journal]);
+    assert_eq!(replayed.status.code(), Some(0), "{replayed:?}");
+    std::fs::remove_dir_all(&place).expect("the folder is there");
 }
 
 #[test]

@@ -22,6 +22,7 @@ fn run_and_executive_answer_the_same_paths() {
     }
     for (verb, path) in [
         ("GET", "/"),
+        ("GET", "/run"),
         ("GET", "/document"),
         ("GET", "/v1/state"),
         ("GET", "/v1/goals"),

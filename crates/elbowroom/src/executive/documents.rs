@@ -125,6 +125,8 @@ documents! {
         /// none if it answers within a second. Until it answers, no action is started, and no
         /// request is accepted.
         pub unanswered: Option<u64>,
+        /// The reason why the world's program is being started again, in words; none if it runs.
+        pub restarting: Option<String>,
         /// Activity of the executive.
         pub activity: Activity,
         /// The reason why it is idle or makes a plan, in words.
@@ -162,6 +164,10 @@ documents! {
         pub goal: String,
         /// The reason why it is set aside while other goals are pursued; none if it is pursued.
         pub aside: Option<String>,
+        /// Its release time, if that has not come.
+        pub release: Option<Exact>,
+        /// The state of a goal to keep, as in the list of goals; none for another goal.
+        pub keep: Option<String>,
     }
 
     /// The open goals, and the most recently closed ones.
@@ -180,7 +186,14 @@ documents! {
         pub value: Exact,
         /// Its deadline on the world's clock, if there is one.
         pub deadline: Option<Exact>,
-        /// `pursued`; `set-aside` while others are pursued; `impossible` if no plan exists, or
+        /// Its release time on the world's clock, if there is one.
+        pub release: Option<Exact>,
+        /// `true` for a goal to keep, which is closed only when it is cancelled.
+        pub keep: bool,
+        /// Name of the client that has given it, if it is known.
+        pub by: Option<String>,
+        /// `queued` until its release time; `kept` while a goal to keep holds, and `queued` while it does not and
+        /// other goals are pursued; `pursued`; `set-aside` while others are pursued; `impossible` if no plan exists, or
         /// `unplanned` if none was found, when the executive is idle; `achieved`, `cancelled`, or
         /// `failed` if it was not achieved by its deadline.
         pub state: String,
@@ -231,6 +244,22 @@ documents! {
         pub since: Option<Exact>,
         /// Number of plans adopted so far.
         pub plans: usize,
+        /// The last actions that ended, oldest first, including those of earlier plans.
+        pub ended: Vec<EndedAction>,
+    }
+
+    /// An action that has ended.
+    pub struct EndedAction {
+        /// The number of its start.
+        pub ticket: u64,
+        /// The action.
+        pub action: String,
+        /// The time of its start.
+        pub since: Exact,
+        /// The time of its end.
+        pub end: Exact,
+        /// `succeeded`, `failed` or `cancelled`.
+        pub state: String,
     }
 
     /// An action of a plan.
@@ -245,6 +274,8 @@ documents! {
         pub state: String,
         /// The number of its start, if it was started.
         pub ticket: Option<u64>,
+        /// The name of the quantity that is its duration, if the guarantee has an interval for it.
+        pub parameter: Option<String>,
     }
 
     /// The guarantee for the remaining plan.
@@ -315,6 +346,19 @@ documents! {
         /// The deadline in seconds from now, instead of `deadline`; a positive number.
         [optional serde(default)]
         pub within: Option<GivenNumber>,
+        /// Its release time on the world's clock: it is not pursued before. By default it is pursued at once.
+        [optional serde(default)]
+        pub release: Option<GivenNumber>,
+        /// The release time in seconds from now, instead of `release`; a positive number.
+        [optional serde(default)]
+        pub after: Option<GivenNumber>,
+        /// `true` for a goal to keep: it is achieved again whenever it does not hold and no other goal is pursued. It has
+        /// no deadline, and is closed only when it is cancelled.
+        [optional serde(default)]
+        pub keep: bool,
+        /// Name of the client, for the records: up to 64 characters.
+        [optional serde(default)]
+        pub by: Option<String>,
     }
 
     /// The end of a running action, reported or requested by a client.

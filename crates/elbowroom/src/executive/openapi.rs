@@ -3,8 +3,8 @@
 use serde_json::{Map, Value, json};
 
 use super::documents::{
-    GoalsNow, GuaranteeNow, NewFact, NewGoal, NewNumber, NewOutcome, NewProblem, NextNow, PlanNow,
-    Refusal, State, Taken,
+    GoalNow, GoalsNow, GuaranteeNow, NewFact, NewGoal, NewNumber, NewOutcome, NewProblem, NextNow,
+    PlanNow, Refusal, State, Taken,
 };
 use super::schema::Described;
 
@@ -68,6 +68,11 @@ pub const METHODS: &[Method] = &[
         Answer::Json(GoalsNow::schema),
     ),
     get(
+        "/v1/goals/{name}",
+        "The open goal of that name, or otherwise the last one that was closed",
+        Answer::Json(GoalNow::schema),
+    ),
+    get(
         "/v1/plan",
         "The plan, with the states of its actions",
         Answer::Json(PlanNow::schema),
@@ -89,6 +94,16 @@ pub const METHODS: &[Method] = &[
         Answer::Other(
             "text/event-stream",
             "Events named `entry`; `over` when there are no more",
+        ),
+    ),
+    get(
+        "/v1/state/events",
+        "The state, goals, plan, guarantee and last decision as one document, and then its differences, as \
+         server-sent events",
+        Answer::Other(
+            "text/event-stream",
+            "`document` with the document, without facts and numbers; `change` with a JSON merge patch \
+             (RFC 7396) at least every half second; `over` at the end",
         ),
     ),
     get(

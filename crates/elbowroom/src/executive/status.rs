@@ -1,5 +1,6 @@
 //! State of a run, for clients of an executive.
 
+mod ended;
 mod goals;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -14,15 +15,16 @@ use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_model::{Situation, Task};
 use elbowroom_num::Rational;
 use elbowroom_pddl::{ProblemText, write_problem};
-use elbowroom_plan::{ParameterId, ParameterKind};
+use elbowroom_plan::{InstanceId, ParameterId, ParameterKind};
 use elbowroom_report::exact::Exact;
-use elbowroom_report::trace::SnapshotLine;
+use elbowroom_report::trace::{ClosedGoalLine, SnapshotLine};
 
+use ended::EndedActions;
 use goals::GoalList;
 
 use super::documents::{
-    Activity, GoalsNow, GuaranteeNow, InDoubt, LowerEnd, NextNow, NumberNow, PlanNow, Room,
-    Running, State, StepNow, UpperEnd,
+    Activity, GoalNow, GoalsNow, GuaranteeNow, InDoubt, LowerEnd, NextNow, NumberNow, PlanNow,
+    Room, Running, State, StepNow, UpperEnd,
 };
 
 /// Follows a persistent run by its record. Clones share the state. Requests are answered at once
@@ -49,6 +51,7 @@ struct StatusData {
     started: BTreeSet<u64>,
     plans: usize,
     steps: Vec<StepNow>,
+    ended: EndedActions,
     since: Option<Rational>,
     parameters: Vec<Room>,
     promise: Option<(GuaranteeLevel, Rational)>,
@@ -109,6 +112,16 @@ impl Status {
         self.lock().goals.all()
     }
 
+    /// Returns the open goal of that name, or otherwise the last closed one.
+    pub fn goal(&self, name: &str) -> Option<GoalNow> {
+        self.lock().goals.find(name)
+    }
+
+    /// Returns the most recently closed goals, for the snapshot of a new segment of the journal.
+    pub fn closed_goals(&self) -> Vec<ClosedGoalLine> {
+        self.lock().goals.closed()
+    }
+
     /// Returns the present state. Its facts and numbers include timed initials and continuous
     /// effects since the last entry of the record.
     pub fn state(&self) -> State {
@@ -161,6 +174,11 @@ impl Status {
         }
     }
 
+    /// Returns the time of the world's clock at its last message.
+    pub fn now(&self) -> Rational {
+        self.lock().now.clone()
+    }
+
     /// Returns the current plan.
     pub fn plan(&self) -> PlanNow {
         let known = self.lock();
@@ -168,6 +186,7 @@ impl Status {
             steps: known.steps.clone(),
             since: known.since.clone().map(Exact),
             plans: known.plans,
+            ended: known.ended.all(),
         }
     }
 
@@ -204,8 +223,7 @@ impl Status {
             decided: decided.map(|(time, _)| Exact(time.clone())),
             until,
             why: known
-                .idle_reason
-                .clone()
+                .rest()
                 .or_else(|| decided.map(|(_, it)| it.reason.to_string())),
             step: to_come.cloned(),
         }
@@ -265,10 +283,11 @@ impl StatusData {
             () => Activity::Executing,
         };
         let past = self.outdated_reason.map(str::to_owned);
-        let why = past.or_else(|| self.idle_reason.clone());
+        let why = past.or_else(|| self.rest());
         State {
             now: Exact(self.now.clone()),
             unanswered: None,
+            restarting: None,
             why: why.or_else(|| self.planning_reason.clone()),
             activity,
             goals: self.goals.open(),
@@ -280,12 +299,27 @@ impl StatusData {
         }
     }
 
+    /// Returns the reason why the executive is idle, if it is.
+    fn rest(&self) -> Option<String> {
+        let rest = self.idle_reason.as_ref()?;
+        if rest != NO_GOAL || self.goals.is_empty() {
+            return Some(rest.clone());
+        }
+        match self.goals.next_release() {
+            Some(release) => Some(format!(
+                "the next goal is released at {}",
+                release.to_decimal(3)
+            )),
+            None => Some("no open goal is pursued now".to_owned()),
+        }
+    }
+
     fn begin_at(&mut self, snapshot: &SnapshotLine) {
         self.now.clone_from(snapshot.now());
         self.is_paused = snapshot.paused;
         self.goals = self.goals.at(snapshot);
         if snapshot.plan.is_none() {
-            let why = if self.goals.open().is_empty() {
+            let why = if snapshot.goals.is_empty() {
                 NO_GOAL
             } else {
                 EARLIER_SEGMENT
@@ -401,6 +435,13 @@ impl StatusData {
         self.plans += 1;
         (self.is_planning, self.idle_reason, self.planning_reason) = (false, None, None);
         self.since = Some(mission.now.clone());
+        let parameters = mission.plan.parameters.iter();
+        let durations: BTreeMap<InstanceId, &str> = parameters
+            .filter_map(|parameter| match parameter.kind {
+                ParameterKind::Duration(instance) => Some((instance, parameter.name.as_str())),
+                _ => None,
+            })
+            .collect();
         let numbered = mission.time_triggered.steps.iter().zip(&mission.instances);
         let mut steps: Vec<StepNow> = numbered
             .map(|(step, instance)| {
@@ -419,6 +460,7 @@ impl StatusData {
                     duration: step.duration.clone().map(Exact),
                     state: state.to_owned(),
                     ticket,
+                    parameter: durations.get(instance).map(|it| (*it).to_owned()),
                 }
             })
             .collect();
@@ -479,7 +521,7 @@ impl StatusData {
             Command::Cancel { ticket } => {
                 // An action without a reported start may have no reported end.
                 if !self.started.contains(&ticket.0) {
-                    self.end(ticket.0, "cancelled");
+                    self.end(ticket.0, "cancelled", now);
                 }
                 return;
             }
@@ -502,8 +544,10 @@ impl StatusData {
         self.running.insert(ticket.0, running);
     }
 
-    fn end(&mut self, ticket: u64, how: &str) {
-        self.running.remove(&ticket);
+    fn end(&mut self, ticket: u64, how: &str, now: &Rational) {
+        if let Some(running) = self.running.remove(&ticket) {
+            self.ended.add(running, how, now);
+        }
         self.started.remove(&ticket);
         let own = self
             .steps
@@ -523,10 +567,12 @@ impl StatusData {
                     .get(&ticket.0)
                     .is_some_and(|running| running.planned.is_none());
                 if is_instantaneous {
-                    self.end(ticket.0, SUCCEEDED);
+                    self.end(ticket.0, SUCCEEDED, &observation.time);
                 }
             }
-            Event::Ended { ticket, ending, .. } => self.end(ticket.0, ending.name()),
+            Event::Ended { ticket, ending, .. } => {
+                self.end(ticket.0, ending.name(), &observation.time);
+            }
             Event::Feedback {
                 ticket,
                 completion,

@@ -84,7 +84,9 @@ impl Run<'_> {
             return;
         };
         let belief = &self.belief;
-        let is_achieved = |goal: &OpenGoal| belief.is_certain(&goal.ground) == Ok(true);
+        // Goals to keep have to hold together in the end.
+        let is_achieved =
+            |goal: &OpenGoal| !goal.terms.keep && belief.is_certain(&goal.ground) == Ok(true);
         let is_left = |goal: &OpenGoal| goal.is_pursued() && !is_achieved(goal);
         if !lasting.goals.iter().any(is_left) || !lasting.goals.iter().any(is_achieved) {
             return;
@@ -269,6 +271,7 @@ impl Run<'_> {
     /// Closes the pursued goals, which are achieved, and pursues those that were set aside. Returns
     /// `false` if there are none.
     fn pursue_goals_set_aside(&mut self) -> bool {
+        self.queue_conflicting_goals();
         let Some(lasting) = &mut self.goal_manager else {
             return false;
         };
@@ -278,6 +281,7 @@ impl Run<'_> {
         }
         let (achieved, left) = lasting.goals.drain(..).partition(OpenGoal::is_pursued);
         lasting.goals = left;
+        let achieved = self.keep_achieved(achieved);
         self.record_achieved(&achieved);
         self.pursue_all();
         self.announce_goals();
@@ -363,7 +367,10 @@ impl Run<'_> {
                 others.push(&*goal);
             }
         }
-        others.sort_by_key(|goal| (goal.terms.deadline.is_none(), goal.terms.deadline.as_ref()));
+        others.sort_by_key(|goal| {
+            let deadline = goal.terms.deadline.as_ref();
+            (goal.terms.keep, deadline.is_none(), deadline)
+        });
         let others = others.iter();
         others
             .map(|goal| (goal.name.clone(), goal.terms.value.clone()))
@@ -518,7 +525,7 @@ impl Run<'_> {
 }
 
 /// Returns the names of goals, if there are any.
-fn names_of(goals: &[OpenGoal]) -> Option<String> {
+pub(super) fn names_of(goals: &[OpenGoal]) -> Option<String> {
     let names: Vec<String> = goals.iter().map(|it| format!("`{}`", it.name)).collect();
     (!names.is_empty()).then(|| names.join(", "))
 }

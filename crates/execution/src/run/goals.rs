@@ -6,6 +6,7 @@ use elbowroom_model::ground::Condition;
 use elbowroom_model::{Task, problem};
 
 use super::Run;
+use super::kept_goals::Wait;
 use super::persistent::{PROBLEM_GOAL_NAME, PendingGoalChange};
 use super::snapshot::{GivenGoal, Goals};
 use crate::event::GoalTerms;
@@ -29,6 +30,8 @@ pub(super) struct OpenGoal {
     pub(super) missed_deadline: Option<String>,
     /// `true` if the record contains that it is set aside.
     pub(super) is_announced: bool,
+    /// The reason for which it is queued, if it is.
+    pub(super) wait: Wait,
 }
 
 impl OpenGoal {
@@ -49,6 +52,7 @@ impl OpenGoal {
             set_aside: None,
             missed_deadline: None,
             is_announced: false,
+            wait: Wait::default(),
         }
     }
 
@@ -146,12 +150,18 @@ impl Run<'_> {
         }
     }
 
+    /// Returns the queued goals.
+    pub(super) fn queued_goals(&self) -> Vec<GivenGoal> {
+        let queued = self.goal_manager.iter().flat_map(|it| &it.queued);
+        queued.map(GivenGoal::of).collect()
+    }
+
     /// Parses given goals again.
-    fn parse_again(&self, problem: &Task, goals: &Goals) -> Vec<OpenGoal> {
+    fn parse_again(&self, problem: &Task, goals: &[GivenGoal]) -> Vec<OpenGoal> {
         let Some(lasting) = &self.goal_manager else {
             return Vec::new();
         };
-        let goals = goals.open.iter().filter_map(|given| {
+        let goals = goals.iter().filter_map(|given| {
             let goal = match &given.text {
                 None => OpenGoal::problem_goal(problem),
                 Some(text) => {
@@ -163,7 +173,8 @@ impl Run<'_> {
                 terms: given.terms.clone(),
                 set_aside: given.set_aside.clone(),
                 missed_deadline: given.missed_deadline.clone(),
-                is_announced: given.set_aside.is_some(),
+                is_announced: given.set_aside.is_some() && given.wait != Wait::Conflict,
+                wait: given.wait,
                 ..goal
             })
         });
@@ -175,17 +186,25 @@ impl Run<'_> {
         if !goals.are_changed {
             return Arc::clone(problem);
         }
-        Arc::new(self.planning_task(problem, &self.parse_again(problem, goals)))
+        Arc::new(self.planning_task(problem, &self.parse_again(problem, &goals.open)))
     }
 
-    /// Restores the open goals; `problem` is the task with the goal of the problem.
-    pub(super) fn restore_goals(&mut self, problem: &Arc<Task>, goals: &Goals, is_paused: bool) {
-        let open = self.parse_again(problem, goals);
+    /// Restores the open and the queued goals; `problem` is the task with the goal of the problem.
+    pub(super) fn restore_goals(
+        &mut self,
+        problem: &Arc<Task>,
+        goals: &Goals,
+        queued: &[GivenGoal],
+        is_paused: bool,
+    ) {
+        let open = self.parse_again(problem, &goals.open);
+        let queued = self.parse_again(problem, queued);
         if goals.are_changed {
             self.pursue(problem, &open);
         }
         if let Some(lasting) = &mut self.goal_manager {
             lasting.goals = open;
+            lasting.queued = queued;
             lasting.have_goals_changed = goals.are_changed;
             lasting.is_paused = is_paused;
         }

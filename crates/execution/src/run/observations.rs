@@ -46,6 +46,8 @@ impl Run<'_> {
     /// Updates the belief with the reports, as far as they are credible, and records the news.
     pub(super) fn process_reports(&mut self, observations: Vec<Observation>) {
         let timed_before = self.belief.past_timed_initials();
+        // Deadlines are later than release times.
+        self.release_goals();
         // For each observation, the earliest time among it and the later ones; in reverse order.
         let mut earliest: Vec<Rational> = Vec::with_capacity(observations.len());
         for observation in observations.iter().rev() {
@@ -71,6 +73,7 @@ impl Run<'_> {
         self.close_goals_due_before(&now);
         let _ = self.belief.advance(&now);
         self.close_momentary_goals();
+        self.tend_kept_goals();
         self.record_timed_initials_while_idle(timed_before);
         (self.listener)(&self.belief);
     }

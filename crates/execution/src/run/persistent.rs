@@ -8,6 +8,8 @@
 //! | --- | --- |
 //! | a goal | the goal is now the conjunction of all open goals, except those that are [set aside](super::choosing). If the remaining plan, started now, reaches it, the plan is kept; otherwise a new plan is made |
 //! | a goal with the name of an open one | it replaces the earlier goal; a new plan is made |
+//! | a goal with a release time in the future | it is [queued](super::queued_goals) until then, and then handled like a new goal |
+//! | a goal to keep | it is pursued whenever it does [not hold](super::kept_goals) and no other goal is |
 //! | a goal is abandoned | a plan is made for the others; without others, nothing more is started |
 //! | a fact or value | believed; the plan continues if it is still feasible, otherwise a new one is made |
 //! | an action is cancelled | the world receives the cancellation; its end is an outcome like any other |
@@ -32,6 +34,7 @@ use elbowroom_num::Rational;
 use super::background_search::SearchResults;
 use super::goal_selection::GoalSelection;
 use super::goals::OpenGoal;
+use super::kept_goals::Wait;
 use super::observations::Remark;
 use super::pending::PreparationFallback;
 use super::plan_start::PlanStart;
@@ -76,6 +79,8 @@ pub(super) struct GoalManager<'a> {
     pub(super) reader: Box<dyn GoalReader + 'a>,
     /// The open goals.
     pub(super) goals: Vec<OpenGoal>,
+    /// The goals whose release times have not come, and the goals to keep that are not pursued.
+    pub(super) queued: Vec<OpenGoal>,
     /// `true` if the goals were ever changed.
     pub(super) have_goals_changed: bool,
     pub(super) is_paused: bool,
@@ -130,6 +135,7 @@ impl<'a> Run<'a> {
         self.goal_manager = Some(GoalManager {
             reader: Box::new(reader),
             goals,
+            queued: Vec::new(),
             have_goals_changed: false,
             is_paused: false,
             pending_change: None,
@@ -169,6 +175,9 @@ impl<'a> Run<'a> {
             Request::Pursue { terms, .. } if !terms.value.is_positive() => {
                 Some("the value of a goal is not positive; nothing was made of it")
             }
+            Request::Pursue { terms, .. } if terms.keep && terms.deadline.is_some() => {
+                Some("a goal to keep has no deadline; nothing was made of it")
+            }
             Request::Pursue { name, goal, terms } => {
                 let Ok(condition) = lasting.reader.read(&self.task, goal) else {
                     return Some("it is no goal of this problem; nothing was made of it");
@@ -176,30 +185,9 @@ impl<'a> Run<'a> {
                 let text = Some(goal.clone());
                 let mut given = OpenGoal::new(&self.task, name.clone(), text, condition);
                 given.terms.clone_from(terms);
-                let known = lasting.goals.iter_mut().find(|known| known.name == *name);
-                let is_new = known.is_none();
-                match known {
-                    Some(known) => *known = given,
-                    None => lasting.goals.push(given),
-                }
-                if is_new {
-                    self.add_goals_to_selection();
-                } else {
-                    self.pursue_all();
-                }
-                self.record_goal_change(format!("`{name}` is to be reached"), is_new);
-                None
+                self.add_goal(given)
             }
-            Request::Abandon { name } => {
-                let before = lasting.goals.len();
-                lasting.goals.retain(|known| known.name != *name);
-                if lasting.goals.len() == before {
-                    return Some("no goal of that name is open");
-                }
-                self.pursue_all();
-                self.record_goal_change(format!("`{name}` is abandoned"), false);
-                None
-            }
+            Request::Abandon { name } => self.abandon_goal(name),
             Request::CancelAction { ticket } => self.cancel_on_request(*ticket),
             Request::Pause if lasting.is_paused => Some("it is paused already"),
             Request::Resume if !lasting.is_paused => Some("it is not paused"),
@@ -267,10 +255,14 @@ impl<'a> Run<'a> {
         if lasting.idle_since.is_none() {
             return Ok(false);
         }
-        if lasting.goals.is_empty() {
+        let has_goals = !lasting.goals.is_empty();
+        if !has_goals && !self.has_conflicting_goals() {
             self.plan_events.clear();
         }
-        if self.is_search_due() {
+        if self.is_search_due() && !has_goals {
+            self.plan_events.clear();
+            self.pursue_kept_goals();
+        } else if self.is_search_due() {
             self.wake();
             let reason = Reason::new(Cause::Surprise).about(Subject::AnyObservation);
             self.replan(&reason)?;
@@ -321,6 +313,11 @@ impl<'a> Run<'a> {
     fn wake(&mut self) {
         if let Some(lasting) = &mut self.goal_manager {
             lasting.idle_since = None;
+            for goal in &mut lasting.queued {
+                if goal.wait == Wait::Conflict {
+                    (goal.wait, goal.set_aside) = (Wait::Release, None);
+                }
+            }
         }
         self.pursue_all();
     }
@@ -474,7 +471,7 @@ impl<'a> Run<'a> {
             is_waiting.then(|| since + Rational::from(SEARCH_PAUSE))
         });
         let timed = self.belief.next_timed().cloned();
-        let timed = timed.filter(|_| self.awaits_timed_initials());
+        let timed = timed.filter(|_| self.awaits_timed_initials() || self.has_watched_goals());
         let until = timeout.into_iter().chain(soon).chain(timed).min();
         let until = until.unwrap_or_else(|| self.settings.time_limit.clone());
         self.work_queue.push(PendingStep::CheckTimeouts);
@@ -532,7 +529,8 @@ impl<'a> Run<'a> {
         let goals: Vec<String> = lasting.goals.iter().map(|it| it.name.clone()).collect();
         let is_reached = verdict == Some(&Verdict::GoalReached);
         if is_reached {
-            lasting.goals.clear();
+            let achieved = std::mem::take(&mut lasting.goals);
+            self.keep_achieved(achieved);
         }
         // Without goals, there is no verdict.
         let verdict = verdict.filter(|_| !goals.is_empty());

@@ -16,6 +16,7 @@ use elbowroom_num::Rational;
 
 use super::action_log::KnownStart;
 use super::goals::OpenGoal;
+use super::kept_goals::Wait;
 use super::plan_start::PlanStart;
 use super::work_queue::PendingStep;
 use super::{RefusalBackoff, Run, Verdict};
@@ -43,6 +44,8 @@ pub struct RunSnapshot {
     pub refusals: RefusalBackoff,
     /// The open goals.
     pub goals: Goals,
+    /// The goals whose release times have not come, and the goals to keep that are not pursued.
+    pub queued: Vec<GivenGoal>,
     /// `true` if the run is paused.
     pub is_paused: bool,
     /// The state of the run.
@@ -99,12 +102,14 @@ pub struct GivenGoal {
     pub name: String,
     /// Its text in PDDL; `None` for the goal of the problem.
     pub text: Option<String>,
-    /// Its value and its deadline.
+    /// Its value, its times and its author.
     pub terms: GoalTerms,
     /// The reason for which it is set aside while others are pursued; `None` if it is pursued.
     pub set_aside: Option<String>,
     /// Lateness in words, if its deadline is known to be missed.
     pub missed_deadline: Option<String>,
+    /// The reason for which it is queued, if it is.
+    pub wait: Wait,
 }
 
 impl GivenGoal {
@@ -115,6 +120,7 @@ impl GivenGoal {
             terms: goal.terms.clone(),
             set_aside: goal.set_aside.clone(),
             missed_deadline: goal.missed_deadline.clone(),
+            wait: goal.wait,
         }
     }
 }
@@ -192,7 +198,7 @@ impl Run<'_> {
     /// Lets the recorder rotate. After a rotation, the report and explanations go back no further
     /// than the record.
     fn offer_rotation(&mut self, doing: &dyn Fn() -> RunPhase) {
-        let (goals, is_paused) = (self.goals(), self.is_paused());
+        let (goals, queued, is_paused) = (self.goals(), self.queued_goals(), self.is_paused());
         let (belief, account, progress) = (&self.belief, &self.action_log, &self.clock_watchdog);
         let (allowance, replans) = (&self.expected_planning_time, self.replans);
         let refusals = &self.refusal_backoff;
@@ -205,6 +211,7 @@ impl Run<'_> {
             replans,
             refusals: refusals.clone(),
             goals: goals.clone(),
+            queued: queued.clone(),
             is_paused,
             phase: doing(),
         });
@@ -243,7 +250,7 @@ impl Run<'_> {
         let problem = Arc::clone(&self.task);
         self.belief = stand.belief;
         self.belief.set_goal(&problem);
-        self.restore_goals(&problem, &stand.goals, stand.is_paused);
+        self.restore_goals(&problem, &stand.goals, &stand.queued, stand.is_paused);
         self.initial_belief = self.belief.clone();
         self.action_log.restore(stand.started, stand.starts);
         self.expected_planning_time = stand.allowance;

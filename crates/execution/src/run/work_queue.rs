@@ -83,7 +83,8 @@ impl Run<'_> {
             PendingStep::Send(command) => return Ok(Some(command)),
             PendingStep::Wait(until) => {
                 let limit = Some(self.settings.time_limit.clone());
-                let limits = limit.into_iter().chain(self.next_deadline_of_a_goal());
+                let changes = [self.next_deadline_of_a_goal(), self.next_release()];
+                let limits = limit.into_iter().chain(changes.into_iter().flatten());
                 let until = limits.fold(until, Rational::min);
                 self.open_request = Some(Next::Wait { until });
             }

@@ -8,7 +8,9 @@ use elbowroom::executive::documents::{Activity, GoalsNow, State};
 use super::router::ApiRouter;
 
 /// States of goals, as `GET /v1/goals` has them.
-const GOAL_STATES: [&str; 7] = [
+const GOAL_STATES: [&str; 9] = [
+    "queued",
+    "kept",
     "pursued",
     "set-aside",
     "impossible",

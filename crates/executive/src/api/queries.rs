@@ -11,11 +11,13 @@ impl ApiRouter {
         match self.run() {
             Ok(run) => State {
                 unanswered: self.queue().silence(),
+                restarting: self.queue().world_restart(),
                 ..run.status.state()
             },
             Err(refused) => State {
                 now: Rational::ZERO.into(),
                 unanswered: None,
+                restarting: None,
                 activity: Activity::Beginning,
                 why: Some(refused.error),
                 goals: Vec::new(),

@@ -22,18 +22,12 @@ use crate::request_queue::RequestQueue;
 use crate::trace_buffer::TraceBuffer;
 
 use super::initial_problem::InitialProblem;
+use super::state_stream::DocumentCache;
 
 const JSON: &str = "application/json";
 const TEXT: &str = "text/plain; charset=utf-8";
 const HTML: &str = "text/html; charset=utf-8";
 const METRICS: &str = "text/plain; version=0.0.4; charset=utf-8";
-
-/// Page until the run begins. It reloads itself.
-const WAITING: &str = "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n\
-    <meta http-equiv=\"refresh\" content=\"1\">\n<title>Elbowroom</title>\n\
-    <h1>Waiting for a problem</h1>\n\
-    <p>The executive has no problem yet. Give it one with <code>elbowroom ctl problem FILE</code>; \
-    this page shows the run as soon as there is one.</p>\n</html>\n";
 
 /// Time limit for clients to receive pending responses at the end of the program.
 const DRAIN_TIMEOUT: Duration = Duration::from_secs(1);
@@ -86,7 +80,8 @@ pub struct ApiRouter {
     /// Domain of the problems that clients may submit.
     domain: Option<NamedText>,
     queue: RequestQueue,
-    buffer: TraceBuffer,
+    pub(super) buffer: TraceBuffer,
+    pub(super) documents: DocumentCache,
     /// The run, once there is a problem.
     run: OnceLock<ServedRun>,
     initial: InitialProblem,
@@ -115,6 +110,7 @@ impl ApiRouter {
             domain,
             queue: RequestQueue::default(),
             buffer,
+            documents: DocumentCache::default(),
             run: OnceLock::new(),
             initial: InitialProblem::default(),
             changing: Mutex::new(0),
@@ -228,8 +224,13 @@ impl ApiRouter {
     fn respond(&self, request: &Request, stream: &mut Stream) -> Result<io::Result<()>, ApiError> {
         let broken = |why: String| ApiError::new(500, why, "this is a bug; please report it");
         Ok(match (request.method.as_str(), request.path.as_str()) {
-            ("GET", "/") if self.run().is_err() => respond(stream, 409, HTML, WAITING),
-            ("GET", "/") => respond(stream, 200, HTML, &self.buffer.page().map_err(broken)?),
+            ("GET", "/") if self.domain.is_some() => {
+                respond(stream, 200, HTML, &elbowroom_page::operator_page())
+            }
+            ("GET", "/" | "/run") => {
+                self.run()?;
+                respond(stream, 200, HTML, &self.buffer.page().map_err(broken)?)
+            }
             ("GET", "/document") => {
                 self.run()?;
                 respond(stream, 200, JSON, &self.buffer.document().map_err(broken)?)
@@ -237,6 +238,13 @@ impl ApiRouter {
             ("GET", "/events") => {
                 let begun = respond_with_events(stream);
                 begun.and_then(|()| self.buffer.stream_changes(stream))
+            }
+            ("GET", "/v1/state/events") => {
+                let begun = respond_with_events(stream);
+                begun.and_then(|()| {
+                    self.buffer
+                        .with_listener_count(|| self.stream_state(stream))
+                })
             }
             ("GET", "/v1/events") => {
                 let after = first_line(request)?;
@@ -296,7 +304,14 @@ impl ApiRouter {
                 respond(stream, 200, JSON, &text(&self.run()?.status.guarantee()))
             }
             ("GET", "/v1/next") => respond(stream, 200, JSON, &text(&self.run()?.status.next())),
-            ("GET", path) => return Err(unknown_path_error(path, "GET")),
+            ("GET", path) => match path.strip_prefix("/v1/goals/") {
+                Some(name) => {
+                    let goal = self.run()?.status.goal(name);
+                    let goal = goal.ok_or_else(|| no_goal(name))?;
+                    respond(stream, 200, JSON, &text(&goal))
+                }
+                None => return Err(unknown_path_error(path, "GET")),
+            },
             (method, path) => {
                 if !methods(path).any(|verb| verb == method) {
                     return Err(unknown_path_error(path, method));
@@ -388,9 +403,10 @@ fn first_line(request: &Request) -> Result<Option<usize>, ApiError> {
     })
 }
 
-/// Methods and paths of the page of a run. They are no part of the `OpenAPI` document.
-const PAGE: [(&str, &str); 7] = [
+/// Methods and paths of the pages. They are no part of the `OpenAPI` document.
+const PAGE: [(&str, &str); 8] = [
     ("GET", "/"),
+    ("GET", "/run"),
     ("GET", "/document"),
     ("GET", "/events"),
     ("POST", "/pause"),
@@ -423,6 +439,12 @@ fn unknown_path_error(path: &str, method_name: &str) -> ApiError {
         }
         None => ApiError::new(404, "there is nothing at this path", help),
     }
+}
+
+/// Returns the error for an unknown goal.
+fn no_goal(name: &str) -> ApiError {
+    let error = format!("there is no goal `{}`", name.escape_debug());
+    ApiError::new(404, error, "GET /v1/goals lists the goals")
 }
 
 /// Sends an error as a JSON document.

@@ -265,8 +265,18 @@ fn observation<'a>(observation: &'a ObservationLine, bars: &Bars) -> (&'a Ration
             time,
         } => (&time.0, format!("{fluent} = {}", nearest(&value.0))),
         ObservationLine::Goal {
-            name, goal, time, ..
-        } => (&time.0, format!("asked for: {name}: {goal}")),
+            name,
+            goal,
+            release,
+            by,
+            time,
+            ..
+        } => {
+            let by = by.as_ref().map_or(String::new(), |by| format!(" by {by}"));
+            let release = release.as_ref();
+            let release = release.map_or(String::new(), |it| format!(", from {}", nearest(&it.0)));
+            (&time.0, format!("asked for{by}: {name}: {goal}{release}"))
+        }
         ObservationLine::Abandon { name, time } => (&time.0, format!("asked to abandon: {name}")),
         ObservationLine::CancelAction { ticket, time } => (
             &time.0,

@@ -37,7 +37,7 @@ test("the page follows the run to its end, and then says what the report of its 
   const { address, over } = served(8, "--trace", file("live.jsonl"));
   const tab = await watched(await address);
   await tab.waitForFunction(() => document.querySelector("#live [role=status]").textContent === "The run goes on.");
-  assert.match(await verdict(tab), /^The run goes on; it is at /);
+  assert.match(await verdict(tab), /^The run continues; its time is /);
   const rows = rowsOf(tab, "Every decision");
   const early = await rows.count();
   await tab.waitForFunction((early) => document.querySelectorAll("section tbody tr").length > early + 4, early);

@@ -171,6 +171,10 @@ class Executive(BackgroundRun):
         value: Number | None = None,
         deadline: Number | None = None,
         within: Number | None = None,
+        release: Number | None = None,
+        after: Number | None = None,
+        keep: bool = False,
+        by: str | None = None,
     ) -> str:
         """Submits a goal.
 
@@ -184,6 +188,10 @@ class Executive(BackgroundRun):
                 of values are pursued.
             deadline: by when it is to be achieved, on the world's clock.
             within: the same in seconds from now.
+            release: from when on it is pursued, on the world's clock; it is queued until then.
+            after: the same in seconds from now.
+            keep: it is achieved again whenever it does not hold and no other goal is pursued, until it is cancelled.
+            by: name of the client, for the records.
 
         Returns:
             The name of the goal.
@@ -194,7 +202,16 @@ class Executive(BackgroundRun):
         """
         now = self.status().now
         name, state = self._native.submit_goal(
-            goal, name, _text(value), _text(deadline), _text(within), self._patience()
+            goal,
+            name,
+            _text(value),
+            _text(deadline),
+            _text(within),
+            _text(release),
+            _text(after),
+            keep,
+            by,
+            self._patience(),
         )
         self._given[name] = now
         self._check(state)
@@ -283,7 +300,7 @@ class Executive(BackgroundRun):
         return answers.planned(document(self._native.plan()))
 
     def wait(self, goal: str, timeout: float | None = None) -> Goal:
-        """Waits until a goal is achieved, cancelled, failed, impossible, or unplanned. Returns the goal.
+        """Waits until a goal is achieved or kept, cancelled, failed, impossible, or unplanned. Returns the goal.
 
         Raises:
             TimeoutError: after ``timeout`` seconds.

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 
 class Goal(NamedTuple):
-    """A goal of an executive; true in conditions if it was achieved."""
+    """A goal of an executive; true in conditions if it was achieved, or is kept."""
 
     name: str
     """Its name; that of the problem's own goal is ``problem``."""
@@ -18,8 +18,15 @@ class Goal(NamedTuple):
     """Its value, a positive number."""
     deadline: Fraction | None
     """Its deadline on the world's clock, if there is one."""
+    release: Fraction | None
+    """Its release time on the world's clock, if there is one."""
+    keep: bool
+    """``True`` for a goal to keep, which is closed only when it is cancelled."""
+    by: str | None
+    """Name of the client that has given it, if it is known."""
     state: str
-    """``"pursued"``; ``"set-aside"`` while others are pursued; ``"impossible"`` if no plan exists, or ``"unplanned"`` if
+    """``"queued"`` until its release time; ``"kept"`` while a goal to keep holds, and ``"queued"`` while it does not and
+    other goals are pursued; ``"pursued"``; ``"set-aside"`` while others are pursued; ``"impossible"`` if no plan exists, or ``"unplanned"`` if
     none was found, from where the executive rests; ``"achieved"``; ``"cancelled"``; or ``"failed"`` if it was not achieved by
     its deadline."""
     given: Fraction | None
@@ -30,7 +37,7 @@ class Goal(NamedTuple):
     """The reason for another state than ``"pursued"`` and ``"achieved"``, if it is known."""
 
     def __bool__(self) -> bool:
-        return self.state == "achieved"
+        return self.state in ("achieved", "kept")
 
     @property
     def is_open(self) -> bool:
@@ -39,8 +46,8 @@ class Goal(NamedTuple):
 
     @property
     def is_undecided(self) -> bool:
-        """``True`` while the executive pursues the goal, or other goals first."""
-        return self.state in ("pursued", "set-aside")
+        """``True`` while the executive pursues the goal, or other goals first, or until its release time."""
+        return self.state in ("queued", "pursued", "set-aside")
 
 
 class RunningAction(NamedTuple):

@@ -95,6 +95,10 @@ class Executive:
         value: str | None,
         deadline: str | None,
         within: str | None,
+        release: str | None,
+        after: str | None,
+        keep: bool,
+        by: str | None,
         timeout: float,
     ) -> tuple[str, str]: ...
     def cancel_goal(self, name: str, timeout: float) -> str: ...

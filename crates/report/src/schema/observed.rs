@@ -89,6 +89,15 @@ pub enum ObservationLine {
         /// Its deadline on the world's clock, if there is one.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         deadline: Option<Exact>,
+        /// The time before which it is not pursued, if there is one.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        release: Option<Exact>,
+        /// `true` for a goal to keep.
+        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+        keep: bool,
+        /// Name of the client that has given it, if it is known.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        by: Option<String>,
         /// The time.
         time: Exact,
     },

@@ -15,8 +15,8 @@ use super::schema::{
     GoalChangeLine, GoalLookLine, GoalState, IdleLine, InstanceLine, InterruptedLine, IntervalLine,
     IssuedCommandLine, KeptPlanLine, Line, NetworkLine, ObservationLine, ObservedLine, OrderLine,
     ParameterLine, PlanLine, PlannedLine, PlanningLine, ReasonLine, ReportLine, RunningLine,
-    ShortfallLine, SituationLine, StepLine, TimeAdvanceLine, WarningLine, WindowLine,
-    WorldFailedLine, members, terms,
+    ShortfallLine, SituationLine, StepLine, TermsLine, TimeAdvanceLine, WarningLine, WindowLine,
+    WorldFailedLine,
 };
 use crate::exact::Exact;
 
@@ -119,6 +119,9 @@ impl Line {
                     GoalChange::Achieved => (GoalState::Achieved, None),
                     GoalChange::SetAside { why } => (GoalState::SetAside, Some(why.to_owned())),
                     GoalChange::Pursued => (GoalState::Pursued, None),
+                    GoalChange::Released => (GoalState::Released, None),
+                    GoalChange::Kept => (GoalState::Kept, None),
+                    GoalChange::Queued { why } => (GoalState::Queued, Some(why.to_owned())),
                     GoalChange::Failed { why } => (GoalState::Failed, Some(why.to_owned())),
                 };
                 Self::Goal(GoalChangeLine {
@@ -267,12 +270,21 @@ impl ObservationLine {
     fn from_request(request: &Request, time: Exact) -> Self {
         match request {
             Request::Pursue { name, goal, terms } => {
-                let (value, deadline) = members(terms);
+                let TermsLine {
+                    value,
+                    deadline,
+                    release,
+                    keep,
+                    by,
+                } = TermsLine::of(terms);
                 Self::Goal {
                     name: name.clone(),
                     goal: goal.clone(),
                     value,
                     deadline,
+                    release,
+                    keep,
+                    by,
                     time,
                 }
             }
@@ -304,12 +316,22 @@ impl ObservationLine {
                 goal,
                 value,
                 deadline,
+                release,
+                keep,
+                by,
                 time,
             } => {
+                let terms = TermsLine {
+                    value: value.clone(),
+                    deadline: deadline.clone(),
+                    release: release.clone(),
+                    keep: *keep,
+                    by: by.clone(),
+                };
                 let request = Request::Pursue {
                     name: name.clone(),
                     goal: goal.clone(),
-                    terms: terms(value.as_ref(), deadline.as_ref()),
+                    terms: terms.terms(),
                 };
                 (request, time)
             }

@@ -17,7 +17,8 @@ use serde::{Deserialize, Serialize};
 use crate::exact::Exact;
 
 pub use plan_adoption::{
-    GoalLine, NewsLine, PendingGoalChangeLine, PlanAdoptionLine, SituationActionLine,
+    ClosedGoalLine, GoalLine, NewsLine, PendingGoalChangeLine, PlanAdoptionLine,
+    SituationActionLine, WaitLine,
 };
 pub use starts::{RunningActionLine, StartLine};
 
@@ -62,6 +63,12 @@ pub struct SnapshotLine {
     /// The open goals.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub goals: Vec<GoalLine>,
+    /// The goals whose release times have not come, and the goals to keep that are not pursued.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub queued: Vec<GoalLine>,
+    /// The last closed goals, by time of closing.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub closed: Vec<ClosedGoalLine>,
     /// `true` if the goals have always been those of the problem.
     #[serde(default, skip_serializing_if = "is_false")]
     pub problem_goals: bool,
@@ -183,7 +190,9 @@ impl SnapshotLine {
             doubtful_numbers: doubtful_numbers
                 .flat_map(|(fluent, doubts)| DoubtLine::all(&task.fluent_name(*fluent), doubts))
                 .collect(),
-            goals: plan_adoption::goal_lines(&stand.goals),
+            goals: plan_adoption::goal_lines(&stand.goals.open),
+            queued: plan_adoption::goal_lines(&stand.queued),
+            closed: Vec::new(),
             problem_goals: !stand.goals.are_changed,
             paused: stand.is_paused,
             replans: stand.replans,
@@ -281,9 +290,17 @@ impl SnapshotLine {
                 open: plan_adoption::goals_of(&self.goals),
                 are_changed: !self.problem_goals,
             },
+            queued: plan_adoption::goals_of(&self.queued),
             is_paused: self.paused,
             phase: doing,
         })
+    }
+
+    /// Returns the names of the goals.
+    pub fn goal_names(&self) -> impl Iterator<Item = &str> {
+        let open = self.goals.iter().chain(&self.queued);
+        let open = open.map(|goal| goal.name.as_str());
+        open.chain(self.closed.iter().map(|goal| goal.name.as_str()))
     }
 
     /// The time.

@@ -5,20 +5,28 @@ use std::collections::VecDeque;
 use elbowroom_execution::{GoalChange, GoalTerms};
 use elbowroom_num::Rational;
 use elbowroom_report::exact::Exact;
-use elbowroom_report::trace::SnapshotLine;
+use elbowroom_report::trace::{ClosedGoalLine, GoalLine, SnapshotLine, WaitLine};
 
 use super::super::documents::{GoalNow, GoalsNow, OpenGoal};
 
 /// Maximum number of closed goals in the list.
 const MOST_CLOSED: usize = 1000;
 
+const QUEUED: &str = "queued";
 const PURSUED: &str = "pursued";
 const SET_ASIDE: &str = "set-aside";
 const IMPOSSIBLE: &str = "impossible";
 const UNPLANNED: &str = "unplanned";
+const KEPT: &str = "kept";
 const ACHIEVED: &str = "achieved";
 const CANCELLED: &str = "cancelled";
 const FAILED: &str = "failed";
+
+/// Reason for the state of a queued goal.
+const NOT_RELEASED: &str = "its release time has not come";
+
+/// Reason for the state of a queued goal to keep.
+const OTHERS_FIRST: &str = "it does not hold; other goals are pursued first";
 
 /// The open goals, and the most recently closed ones.
 #[derive(Clone, Debug, Default)]
@@ -30,15 +38,21 @@ pub(super) struct GoalList {
 impl GoalList {
     /// Adds an open goal with this name and text.
     pub(super) fn add(&mut self, (name, goal): (&str, &str), terms: &GoalTerms, now: &Rational) {
+        let is_early = terms.release.as_ref().is_some_and(|it| it > now);
+        // Goals to keep are evaluated afterwards.
+        let is_queued = is_early || terms.keep;
         self.open.push(GoalNow {
             name: name.to_owned(),
             goal: goal.to_owned(),
             value: Exact(terms.value.clone()),
             deadline: terms.deadline.clone().map(Exact),
-            state: PURSUED.to_owned(),
+            release: terms.release.clone().map(Exact),
+            keep: terms.keep,
+            by: terms.by.clone(),
+            state: if is_queued { QUEUED } else { PURSUED }.to_owned(),
             given: Some(Exact(now.clone())),
             since: Exact(now.clone()),
-            why: None,
+            why: is_early.then(|| NOT_RELEASED.to_owned()),
         });
     }
 
@@ -48,8 +62,51 @@ impl GoalList {
             name: goal.name.clone(),
             goal: goal.goal.clone(),
             aside: goal.why.clone().filter(|_| goal.state == SET_ASIDE),
+            release: goal
+                .release
+                .clone()
+                .filter(|_| goal.why.as_deref() == Some(NOT_RELEASED)),
+            keep: goal.keep.then(|| goal.state.clone()),
         });
         open.collect()
+    }
+
+    /// Returns `true` if no goal is open.
+    pub(super) fn is_empty(&self) -> bool {
+        self.open.is_empty()
+    }
+
+    /// Returns the next release time if all open goals are queued.
+    pub(super) fn next_release(&self) -> Option<&Rational> {
+        let is_idle = self.open.iter().all(is_waiting);
+        let times = self.open.iter().filter(|_| is_idle);
+        times
+            .filter_map(|goal| Some(&goal.release.as_ref()?.0))
+            .min()
+    }
+
+    /// Returns the closed goals, for a snapshot.
+    pub(super) fn closed(&self) -> Vec<ClosedGoalLine> {
+        let lines = self.closed.iter().map(|goal| ClosedGoalLine {
+            name: goal.name.clone(),
+            goal: goal.goal.clone(),
+            value: goal.value.clone(),
+            deadline: goal.deadline.clone(),
+            release: goal.release.clone(),
+            keep: goal.keep,
+            by: goal.by.clone(),
+            state: goal.state.clone(),
+            given: goal.given.clone(),
+            since: goal.since.clone(),
+            why: goal.why.clone(),
+        });
+        lines.collect()
+    }
+
+    /// Returns the open goal of that name, or otherwise the last closed one.
+    pub(super) fn find(&self, name: &str) -> Option<GoalNow> {
+        let mut all = self.open.iter().chain(self.closed.iter().rev());
+        all.find(|goal| goal.name == name).cloned()
     }
 
     /// Returns all goals in the list.
@@ -62,19 +119,37 @@ impl GoalList {
     /// text from this list.
     pub(super) fn at(&self, snapshot: &SnapshotLine) -> Self {
         let own = self.open.first().map(|goal| &goal.goal);
-        let open = snapshot.goals.iter().map(|line| GoalNow {
+        let now = |line: &GoalLine, state: String, why: Option<String>| GoalNow {
             name: line.name.clone(),
             goal: line.goal.as_ref().or(own).cloned().unwrap_or_default(),
             value: line.value.clone().unwrap_or(Exact(Rational::ONE)),
             deadline: line.deadline.clone(),
-            state: state(line.aside.is_some()),
+            release: line.release.clone(),
+            keep: line.keep,
+            by: line.by.clone(),
+            state,
             given: None,
             since: Exact(snapshot.now().clone()),
-            why: line.aside.clone(),
+            why,
+        };
+        let open = snapshot.goals.iter();
+        let open = open.map(|line| now(line, state(line.aside.is_some()), line.aside.clone()));
+        let queued = snapshot.queued.iter().map(|line| {
+            let (state, why) = match line.waits {
+                Some(WaitLine::Holds) => (KEPT, None),
+                Some(WaitLine::Others) => (QUEUED, Some(OTHERS_FIRST.to_owned())),
+                Some(WaitLine::Conflict) => (QUEUED, line.aside.clone()),
+                None => {
+                    let release = line.release.as_ref();
+                    let is_early = release.is_some_and(|it| it.0 > *snapshot.now());
+                    (QUEUED, is_early.then(|| NOT_RELEASED.to_owned()))
+                }
+            };
+            now(line, state.to_owned(), why)
         });
         Self {
-            open: open.collect(),
-            closed: VecDeque::new(),
+            open: open.chain(queued).collect(),
+            closed: snapshot.closed.iter().map(closed).collect(),
         }
     }
 
@@ -90,10 +165,15 @@ impl GoalList {
                 return;
             }
             GoalChange::SetAside { why } => Some(why.to_owned()),
-            GoalChange::Pursued => None,
+            GoalChange::Queued { why } => Some(why.to_owned()),
+            GoalChange::Pursued | GoalChange::Released | GoalChange::Kept => None,
         };
         if let Some(goal) = self.open.iter_mut().find(|goal| goal.name == name) {
-            goal.state = state(why.is_some());
+            goal.state = match change {
+                GoalChange::Queued { .. } => QUEUED.to_owned(),
+                GoalChange::Kept => KEPT.to_owned(),
+                _ => state(why.is_some()),
+            };
             goal.since = Exact(now.clone());
             goal.why = why;
         }
@@ -103,7 +183,7 @@ impl GoalList {
     /// `is_certain` that no plan exists, otherwise unplanned. Goals that are still set aside are
     /// impossible.
     pub(super) fn mark_unplanned(&mut self, is_certain: bool, why: &str, now: &Rational) {
-        for goal in &mut self.open {
+        for goal in self.open.iter_mut().filter(|it| !is_waiting(it)) {
             let is_pursued = goal.state == PURSUED;
             let is_unplanned = is_pursued && !is_certain;
             let state = if is_unplanned { UNPLANNED } else { IMPOSSIBLE };
@@ -130,9 +210,9 @@ impl GoalList {
         self.close(now, CANCELLED, Some(why), |goal| goal.name == name);
     }
 
-    /// Closes all open goals as achieved.
+    /// Closes all open goals as achieved, except queued ones and goals to keep.
     pub(super) fn close_all(&mut self, now: &Rational) {
-        self.close(now, ACHIEVED, None, |_| true);
+        self.close(now, ACHIEVED, None, |goal| !goal.keep && !is_waiting(goal));
     }
 
     fn close(
@@ -155,6 +235,29 @@ impl GoalList {
     }
 }
 
+/// Returns `true` if an open goal is not pursued, and not considered for a plan.
+fn is_waiting(goal: &GoalNow) -> bool {
+    [QUEUED, KEPT].contains(&goal.state.as_str())
+}
+
 fn state(is_aside: bool) -> String {
     if is_aside { SET_ASIDE } else { PURSUED }.to_owned()
+}
+
+/// Returns a closed goal of a snapshot.
+fn closed(line: &ClosedGoalLine) -> GoalNow {
+    let line = line.clone();
+    GoalNow {
+        name: line.name,
+        goal: line.goal,
+        value: line.value,
+        deadline: line.deadline,
+        release: line.release,
+        keep: line.keep,
+        by: line.by,
+        state: line.state,
+        given: line.given,
+        since: line.since,
+        why: line.why,
+    }
 }

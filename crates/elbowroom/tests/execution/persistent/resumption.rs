@@ -13,7 +13,9 @@ use elbowroom::report::trace::{
     Line, Replay, ReplayPlanner, ReplayWorld, SnapshotLine, Stored, snapshot_text,
 };
 
-use super::scripted::{RandomNumbers, ScriptedWorld, SlowPlanner, abandon, fact, pursue, task};
+use super::scripted::{
+    RandomNumbers, ScriptedWorld, SlowPlanner, abandon, fact, pursue, pursue_from, task,
+};
 
 /// Recorder of a run's lines, and of the possible rotations: the number of lines before each, and
 /// its snapshot.
@@ -58,7 +60,8 @@ fn script(task: &Task, dice: &mut RandomNumbers) -> Vec<Observation> {
         let item = ITEMS[usize::try_from(dice.below(3)).expect("small")];
         let ticket = ActionHandle(dice.below(8));
         let event = match dice.below(12) {
-            0..=4 => pursue(item, &format!("(have {item})")),
+            0..=3 => pursue(item, &format!("(have {item})")),
+            4 => pursue_from(item, &format!("(have {item})"), dice.small(300), None),
             5 => abandon(item),
             6 => fact(task, &format!("(have {item})"), false),
             7 => fact(task, &format!("(here {item})"), dice.below(4) > 0),

@@ -155,6 +155,9 @@ impl Recorder for Notes {
                     GoalChange::Achieved => "achieved".to_owned(),
                     GoalChange::SetAside { why } => format!("set aside, because {why}"),
                     GoalChange::Pursued => "pursued again".to_owned(),
+                    GoalChange::Released => "released".to_owned(),
+                    GoalChange::Kept => "kept".to_owned(),
+                    GoalChange::Queued { why } => format!("queued, because {why}"),
                     GoalChange::Failed { why } => format!("failed, because {why}"),
                 };
                 self.note(format!("{}: `{name}` {change}", at(now)));
@@ -279,14 +282,48 @@ pub(crate) fn pursue_by(name: &str, goal: &str, deadline: i64) -> Event {
     given(name, goal, 1, Some(deadline))
 }
 
+/// A goal that is released at a time, with a deadline if one is given.
+pub(crate) fn pursue_from(name: &str, goal: &str, release: i64, deadline: Option<i64>) -> Event {
+    pursue_on(
+        name,
+        goal,
+        GoalTerms {
+            deadline: deadline.map(Rational::from),
+            release: Some(Rational::from(release)),
+            ..GoalTerms::default()
+        },
+    )
+}
+
+/// A goal to keep.
+pub(crate) fn keep(name: &str, goal: &str) -> Event {
+    pursue_on(
+        name,
+        goal,
+        GoalTerms {
+            keep: true,
+            ..GoalTerms::default()
+        },
+    )
+}
+
 fn given(name: &str, goal: &str, value: i64, deadline: Option<i64>) -> Event {
+    pursue_on(
+        name,
+        goal,
+        GoalTerms {
+            value: Rational::from(value),
+            deadline: deadline.map(Rational::from),
+            ..GoalTerms::default()
+        },
+    )
+}
+
+pub(crate) fn pursue_on(name: &str, goal: &str, terms: GoalTerms) -> Event {
     Event::Asked(Request::Pursue {
         name: name.to_owned(),
         goal: goal.to_owned(),
-        terms: GoalTerms {
-            value: Rational::from(value),
-            deadline: deadline.map(Rational::from),
-        },
+        terms,
     })
 }
 

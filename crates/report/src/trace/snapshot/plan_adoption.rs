@@ -1,7 +1,7 @@
 //! Adopted plan in a snapshot.
 
-use elbowroom_execution::run::{GivenGoal, Goals, KnownStart, PlanAdoption};
-use elbowroom_execution::{ActionHandle, Guards, PlanEvent};
+use elbowroom_execution::run::{GivenGoal, Goals, KnownStart, PlanAdoption, Wait};
+use elbowroom_execution::{ActionHandle, GoalTerms, Guards, PlanEvent};
 use elbowroom_model::{RunningAction, Situation, State, Task};
 use elbowroom_num::Interval;
 use indexmap::IndexMap;
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::super::encode::steps;
 use super::super::replay::read_plan;
-use super::super::schema::{StepLine, members, terms};
+use super::super::schema::{StepLine, TermsLine};
 use super::starts::{action_of, exact};
 use super::{fact, fluent};
 use crate::exact::Exact;
@@ -78,12 +78,89 @@ pub struct GoalLine {
     /// Its deadline on the world's clock, if there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub deadline: Option<Exact>,
+    /// The time before which it is not pursued, if there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub release: Option<Exact>,
+    /// `true` for a goal to keep.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub keep: bool,
+    /// Name of the client that has given it, if it is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub by: Option<String>,
     /// The reason for which it is set aside while others are pursued; `None` if it is pursued.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub aside: Option<String>,
     /// Lateness in words; left out if its deadline is not known to be missed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub late: Option<String>,
+    /// The reason for which it is queued; left out unless it is to be kept and was evaluated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub waits: Option<WaitLine>,
+}
+
+/// Reason for which a goal to keep is queued.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum WaitLine {
+    /// It holds.
+    Holds,
+    /// It does not hold; other goals are pursued first.
+    Others,
+    /// No plan reaches it together with the other goals to keep.
+    Conflict,
+}
+
+impl WaitLine {
+    fn of(wait: Wait) -> Option<Self> {
+        match wait {
+            Wait::Release => None,
+            Wait::Holds => Some(Self::Holds),
+            Wait::Others => Some(Self::Others),
+            Wait::Conflict => Some(Self::Conflict),
+        }
+    }
+
+    fn wait(self) -> Wait {
+        match self {
+            Self::Holds => Wait::Holds,
+            Self::Others => Wait::Others,
+            Self::Conflict => Wait::Conflict,
+        }
+    }
+}
+
+/// A closed goal, for clients. The run does not read it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ClosedGoalLine {
+    /// Its name.
+    pub name: String,
+    /// The goal in PDDL.
+    pub goal: String,
+    /// Its value.
+    pub value: Exact,
+    /// Its deadline on the world's clock, if there was one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub deadline: Option<Exact>,
+    /// Its release time, if there was one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub release: Option<Exact>,
+    /// `true` for a goal to keep.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub keep: bool,
+    /// Name of the client that has given it, if it is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub by: Option<String>,
+    /// Its final state: `achieved`, `cancelled` or `failed`.
+    pub state: String,
+    /// The time at which it was given, if it is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub given: Option<Exact>,
+    /// The time at which it was closed.
+    pub since: Exact,
+    /// The reason for another state than `achieved`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub why: Option<String>,
 }
 
 /// Event that a plan does not account for.
@@ -108,28 +185,53 @@ pub struct PendingGoalChangeLine {
     pub only_more: bool,
 }
 
-pub(super) fn goal_lines(goals: &Goals) -> Vec<GoalLine> {
-    let lines = goals.open.iter().map(|given| {
-        let (value, deadline) = members(&given.terms);
+pub(super) fn goal_lines(goals: &[GivenGoal]) -> Vec<GoalLine> {
+    let lines = goals.iter().map(|given| {
+        let TermsLine {
+            value,
+            deadline,
+            release,
+            keep,
+            by,
+        } = TermsLine::of(&given.terms);
         GoalLine {
             name: given.name.clone(),
             goal: given.text.clone(),
             value,
             deadline,
+            release,
+            keep,
+            by,
             aside: given.set_aside.clone(),
             late: given.missed_deadline.clone(),
+            waits: WaitLine::of(given.wait),
         }
     });
     lines.collect()
+}
+
+impl GoalLine {
+    /// Returns the terms of the goal.
+    pub fn terms(&self) -> GoalTerms {
+        let terms = TermsLine {
+            value: self.value.clone(),
+            deadline: self.deadline.clone(),
+            release: self.release.clone(),
+            keep: self.keep,
+            by: self.by.clone(),
+        };
+        terms.terms()
+    }
 }
 
 pub(super) fn goals_of(lines: &[GoalLine]) -> Vec<GivenGoal> {
     let goals = lines.iter().map(|line| GivenGoal {
         name: line.name.clone(),
         text: line.goal.clone(),
-        terms: terms(line.value.as_ref(), line.deadline.as_ref()),
+        terms: line.terms(),
         set_aside: line.aside.clone(),
         missed_deadline: line.late.clone(),
+        wait: line.waits.map(WaitLine::wait).unwrap_or_default(),
     });
     goals.collect()
 }
@@ -150,7 +252,7 @@ impl PlanAdoptionLine {
                 .map(|(running, ticket)| SituationActionLine::of(running, *ticket, starts))
                 .collect::<Option<_>>()?,
             begun: it.begun_steps.iter().map(|it| it.0).collect(),
-            goals: goal_lines(&it.goals),
+            goals: goal_lines(&it.goals.open),
             problem_goals: !it.goals.are_changed,
             news: it
                 .plan_events
