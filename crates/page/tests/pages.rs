@@ -317,6 +317,8 @@ fn rotated_journal_page_includes_earlier_starts() {
         doubtful_facts: Vec::new(),
         doubtful_numbers: Vec::new(),
         goals: Vec::new(),
+        queued: Vec::new(),
+        closed: Vec::new(),
         problem_goals: true,
         paused: true,
         replans: 0,

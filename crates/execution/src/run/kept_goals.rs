@@ -160,8 +160,8 @@ impl Run<'_> {
             });
             let (wait, is_announced) = (Wait::Conflict, false);
             lasting.queued.push(OpenGoal {
-                wait,
                 is_announced,
+                wait,
                 ..goal
             });
         }

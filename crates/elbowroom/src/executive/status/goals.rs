@@ -164,8 +164,7 @@ impl GoalList {
                 self.close(now, FAILED, Some(why), |goal| goal.name == name);
                 return;
             }
-            GoalChange::SetAside { why } => Some(why.to_owned()),
-            GoalChange::Queued { why } => Some(why.to_owned()),
+            GoalChange::SetAside { why } | GoalChange::Queued { why } => Some(why.to_owned()),
             GoalChange::Pursued | GoalChange::Released | GoalChange::Kept => None,
         };
         if let Some(goal) = self.open.iter_mut().find(|goal| goal.name == name) {
