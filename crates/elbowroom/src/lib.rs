@@ -8,7 +8,7 @@
 //! # Planning
 //!
 //! ```
-//! use elbowroom::answers::Unwatched;
+//! use elbowroom::answers::NoObserver;
 //! use elbowroom::answers::plan::{PlanRequest, plan};
 //! # use elbowroom::model::Task;
 //! # use elbowroom::pddl::{self, Source};
@@ -30,7 +30,7 @@
 //! let task = Task::new(problem);
 //!
 //! let mut request = PlanRequest { task: &task, first_plan_only: true, most_memory: None, self_overlap: false, threads: 1 };
-//! let plan = plan(&mut request, &mut Unwatched)?.plan.expect("there is a plan");
+//! let plan = plan(&mut request, &mut NoObserver)?.plan.expect("there is a plan");
 //! assert_eq!(plan.steps.len(), 1);
 //! # Ok(())
 //! # }

@@ -5,12 +5,12 @@
 //! [`Answer`], which can be serialized as JSON (`docs/formats/network.md`).
 //!
 //! ```
-//! use elbowroom::network::{Request, Verdict, examine, read};
+//! use elbowroom::network::{Request, Verdict, analyze, read};
 //!
 //! let text = "# KIND OF NETWORK\nSTNU\n# Time-Point Names\nbrewed drunk cooled\n# \
 //!             Ordinary Edges\ndrunk 0 cooled\n# Contingent Links\nbrewed 5 9 cooled\n";
 //! let file = read("tea.plainstnu", text.as_bytes())?;
-//! let answer = examine(&file, &Request::default())?;
+//! let answer = analyze(&file, &Request::default())?;
 //! assert_eq!(answer.dynamic.map(|promise| promise.verdict), Some(Verdict::Yes));
 //! assert_eq!(answer.strong.map(|promise| promise.verdict), Some(Verdict::Yes));
 //! # Ok::<(), Box<dyn std::error::Error>>(())

@@ -14,6 +14,9 @@ use std::process::Command;
 
 use toml::{Table, Value};
 
+#[path = "layers/wording.rs"]
+mod wording;
+
 /// Crates by folder, lowest first, with their permitted dependencies.
 const LAYERS: &[(&str, &[&str])] = &[
     ("text", &[]),

@@ -111,6 +111,7 @@ mod work_queue;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
+use elbowroom_model::ground::Action;
 use elbowroom_model::{Footprint, Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::{Rational, work};
 
@@ -379,7 +380,8 @@ impl<'a> Run<'a> {
     /// Records the starts of actions. The world receives the commands before anything else is done.
     fn start(&mut self, orders: Vec<Order>) {
         let mut commands = Vec::with_capacity(orders.len());
-        for order in orders {
+        for mut order in orders {
+            order.action = self.whole_action(order.action);
             let ticket = self.action_log.open(&order, &self.now);
             let planned = order.duration.clone().unwrap_or_default();
             let timeout = self.settings.timeout.of(&order.action.name, &planned);
@@ -397,6 +399,16 @@ impl<'a> Run<'a> {
             commands.push(command);
         }
         self.send(commands);
+    }
+
+    /// Returns the action with all its effects. An action that was running when the plan was made has
+    /// no other effects in the plan than those that could still take place. If it has to be started
+    /// again, the others can take place as well.
+    fn whole_action(&self, action: Arc<Action>) -> Arc<Action> {
+        match self.task.instantiate(action.schema, &action.arguments) {
+            Ok(whole) if whole != *action => Arc::new(whole),
+            _ => action,
+        }
     }
 
     /// Records the cancellation of actions. The world receives the commands before anything else is

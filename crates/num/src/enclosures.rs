@@ -24,11 +24,11 @@ const ROUNDING_ERROR: i128 = 64;
 /// 25th of the previous one.
 ///
 /// ```
-/// use elbowroom_num::{Rational, enclosed};
+/// use elbowroom_num::{Rational, enclosures};
 ///
-/// let [below, above] = enclosed::ln(&Rational::from(10)).ok_or("10 is positive")?;
+/// let [below, above] = enclosures::ln(&Rational::from(10)).ok_or("10 is positive")?;
 /// assert!(below < above && above.to_decimal(12) == "2.302585092994");
-/// assert_eq!(enclosed::ln(&Rational::ZERO), None);
+/// assert_eq!(enclosures::ln(&Rational::ZERO), None);
 /// # Ok::<(), &str>(())
 /// ```
 pub fn ln(argument: &Rational) -> Option<[Rational; 2]> {

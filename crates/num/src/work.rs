@@ -33,7 +33,7 @@ thread_local! {
 /// use elbowroom_num::work::{self, Stop};
 ///
 /// let stop = Stop::default();
-/// stop.obey();
+/// stop.install_for_thread();
 /// assert!(!work::is_stopped());
 /// stop.request();
 /// assert!(work::is_stopped() && work::Budget::new(1_000).is_spent());

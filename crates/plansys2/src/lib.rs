@@ -19,7 +19,7 @@
 //! ```
 //! use std::time::Duration;
 //! use elbowroom_plansys2::message::{ActionExecution, kind};
-//! use elbowroom_plansys2::{Action, Effect, Hub, Told};
+//! use elbowroom_plansys2::{Action, Effect, Hub, ActionUpdate};
 //!
 //! let mut hub = Hub::new("elbowroom");
 //! let action = Action { ticket: 1, name: "beep".into(), arguments: vec![], is_instantaneous: false };
@@ -27,7 +27,7 @@
 //! hub.effects(); // the request
 //! let answer = ActionExecution { kind: kind::RESPONSE, node_id: "robot".into(), action: "beep".into(), ..Default::default() };
 //! hub.message(&answer, Duration::from_millis(20));
-//! assert!(hub.effects().contains(&Effect::Tell(1, Told::Started)));
+//! assert!(hub.effects().contains(&Effect::Report(1, ActionUpdate::Started)));
 //! ```
 
 pub mod interface;

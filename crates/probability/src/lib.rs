@@ -28,7 +28,7 @@
 //! use elbowroom_plan::partial_order::partial_order;
 //! use elbowroom_probability::dispatch::patient;
 //! use elbowroom_probability::{
-//!     Circumstances, Likelihoods, Model, OrderSearch, SearchSettings, Semantics,
+//!     SearchState, Likelihoods, Model, OrderSearch, SearchSettings, Semantics,
 //! };
 //!
 //! let domain = Source::new(
@@ -53,7 +53,7 @@
 //!     facts.whole.becomes_false = 0.25";
 //! let likelihoods = elbowroom_probability::likelihoods::read(text.as_bytes(), &task)?;
 //!
-//! let initial = Circumstances::initial(&task);
+//! let initial = SearchState::initial(&task);
 //! let model = Model::new(task, plan, &likelihoods, Semantics::Paper)?;
 //! let mut search = OrderSearch::new(Arc::new(model), SearchSettings::default());
 //! let found = search.best_order(&initial, &mut patient)?;

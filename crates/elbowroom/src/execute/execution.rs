@@ -61,7 +61,7 @@ pub fn execute(
 ///
 /// use elbowroom::execute::Execution;
 /// use elbowroom::execution::run::{Next, Verdict};
-/// use elbowroom::execution::{Command, Event, Ending, Observation, Passage};
+/// use elbowroom::execution::{Command, Event, Ending, Observation, TimeAdvance};
 /// use elbowroom::model::Task;
 /// use elbowroom::num::Rational;
 /// use elbowroom::pddl::{self, Source};
@@ -94,7 +94,7 @@ pub fn execute(
 ///         Next::Wait { until } => {
 ///             let now = coming.iter().map(|it| it.time.clone()).chain([until]).min().unwrap();
 ///             let observations = coming.extract_if(.., |it| it.time <= now).collect();
-///             run.observe(Passage { now, observations })?;
+///             run.observe(TimeAdvance { now, observations })?;
 ///         }
 ///         Next::Look { .. } => run.see(Vec::new())?,
 ///         Next::Over(report) => break report,

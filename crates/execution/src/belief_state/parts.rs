@@ -139,6 +139,14 @@ impl Guards {
         })
     }
 
+    /// Returns `true` if there is one guard for each end effect and continuous effect of `action`.
+    pub fn fit(&self, action: &Action) -> bool {
+        action.durative().is_some_and(|body| {
+            self.at_end.len() == body.end.effects.len()
+                && self.continuous.len() == body.continuous.len()
+        })
+    }
+
     /// Returns the running action with these guards.
     pub fn running(&self, action: &Action, start: Rational, duration: Interval) -> RunningAction {
         let mut action = action.clone();

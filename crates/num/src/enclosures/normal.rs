@@ -45,9 +45,9 @@ const INV_SQRT_2PI: &str =
 /// a few units of 2^-160, and each squaring at most doubles that and adds one.
 ///
 /// ```
-/// use elbowroom_num::{Rational, enclosed};
+/// use elbowroom_num::{Rational, enclosures};
 ///
-/// let [below, above] = enclosed::exp_of_minus(&Rational::ONE);
+/// let [below, above] = enclosures::exp_of_minus(&Rational::ONE);
 /// assert!(below < above && above.to_decimal(12) == "0.367879441171");
 /// ```
 pub fn exp_of_minus(argument: &Rational) -> [Rational; 2] {

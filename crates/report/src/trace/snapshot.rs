@@ -265,8 +265,12 @@ impl SnapshotLine {
             }
         };
         let action = |ticket: ActionHandle| starts::action_of(&starts, ticket).cloned();
-        if let Some(unknown) = parts.running.keys().find(|it| action(**it).is_none()) {
-            return Err(format!("{unknown} is running, and was not started"));
+        for (ticket, running) in &parts.running {
+            let action = action(*ticket)
+                .ok_or_else(|| format!("{ticket} is running, and was not started"))?;
+            if !running.guards.fit(&action) {
+                return Err(format!("{ticket} has other effects than {}", action.name));
+            }
         }
         let refused = self.refused.iter();
         Ok(RunSnapshot {

@@ -14,7 +14,7 @@ use elbowroom::report::trace::{
     Line, Replay, ReplayPlanner, ReplayPreparer, ReplayWorld, SnapshotLine, Stored, snapshot_text,
 };
 
-use super::scripted::{RandomNumbers, SlowPlanner, abandon, fact, pursue};
+use super::scripted::{RandomNumbers, SlowPlanner, abandon, fact, keep, pursue, pursue_from};
 use crate::background_planner::{
     ScriptedBackgroundPlanner, ScriptedBackgroundPreparer, announcing_world,
 };
@@ -60,7 +60,9 @@ fn script(task: &Task, dice: &mut RandomNumbers) -> Vec<(Rational, Event)> {
         let item = ITEMS[usize::try_from(dice.below(5)).expect("small")];
         let ticket = ActionHandle(dice.below(12));
         let event = match dice.below(20) {
-            0..=7 => pursue(item, &format!("(have {item})")),
+            0..=5 => pursue(item, &format!("(have {item})")),
+            6 => pursue_from(item, &format!("(have {item})"), dice.small(240), None),
+            7 => keep(item, &format!("(have {item})")),
             8 => abandon(item),
             9 | 10 => fact(task, &format!("(have {item})"), false),
             11 => fact(task, &format!("(here {item})"), dice.below(4) > 0),
@@ -313,7 +315,7 @@ fn record_rotated_during_run_replays_to_same_decisions() {
             && under_way > 60
             && with_news > 2
             && turning > 5
-            && begun > 5,
+            && begun > 3,
         "{counts:?}"
     );
 }
