@@ -16,7 +16,7 @@
 //!
 //! use elbowroom::answers::EnvelopeRequest;
 //! use elbowroom::envelope::Guarantee;
-//! use elbowroom::export::{box_check, opened};
+//! use elbowroom::export::{box_check, parametrized_plan};
 //! use elbowroom::model::Task;
 //! use elbowroom::parse_box;
 //! use elbowroom::pddl::{self, Source};
@@ -36,7 +36,7 @@
 //! );
 //! let task = Arc::new(Task::new(pddl::read_problem(&domain, &problem)?.0));
 //! let (plan, _) = pddl::read_plan(&Source::new("plan", "0: (deliver) [10]"), &task)?;
-//! let plan = opened(&EnvelopeRequest::new(&task, plan))?;
+//! let plan = parametrized_plan(&EnvelopeRequest::new(&task, plan))?;
 //! let envelope = parse_box("dur_0=[5,28]", &plan)?;
 //! let text = box_check(&task, &plan, &envelope, Guarantee::Weak)?;
 //! assert_eq!(text.matches("(check-sat)").count(), 2);

@@ -41,7 +41,7 @@
 //! ```
 //! use std::sync::Arc;
 //!
-//! use elbowroom::flow::{Settings, robust_plan};
+//! use elbowroom::pipeline::{Settings, robust_plan};
 //! # use elbowroom::model::Task;
 //! # use elbowroom::pddl::{self, Source};
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -179,7 +179,7 @@ fn threads_are_spawned_in_one_file() {
             }
         }
     }
-    assert_eq!(found, ["side_by_side.rs"]);
+    assert_eq!(found, ["parallel.rs"]);
 }
 
 /// Cargo lists the dependencies of the library alone.

@@ -21,7 +21,7 @@
 //! use elbowroom_laboratory::perturbed::PerturbedExperiment;
 //! use elbowroom_laboratory::untimed::EXECUTORS;
 //!
-//! assert!(!PerturbedExperiment::is_one("format = \"elbowroom-experiment\""));
+//! assert!(!PerturbedExperiment::is_experiment("format = \"elbowroom-experiment\""));
 //! assert!(EXECUTORS.iter().any(|executor| executor.name == "esterel"));
 //! ```
 

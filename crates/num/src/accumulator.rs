@@ -1,4 +1,4 @@
-//! Sums of many products: [`Total`].
+//! Sums of many products: [`Accumulator`].
 
 use crate::Rational;
 
@@ -8,9 +8,9 @@ use crate::Rational;
 /// as long as the numbers are small.
 ///
 /// ```
-/// use elbowroom_num::{Rational, Total};
+/// use elbowroom_num::{Rational, Accumulator};
 ///
-/// let mut total = Total::default();
+/// let mut total = Accumulator::default();
 /// total.add(&Rational::new(1, 3));
 /// total.add_product(&Rational::new(1, 6), &Rational::from(4));
 /// assert_eq!(total.value(), Rational::ONE);

@@ -12,9 +12,9 @@ use crate::Rational;
 ///
 /// let times = [Rational::new(1, 2), Rational::new(1, 3)];
 /// let unit = CommonDenominator::of(&times).expect("small numbers");
-/// assert_eq!(unit.whole(&times[0]), Some(3));
-/// assert_eq!(unit.whole(&Rational::new(1, 4)), None);
-/// assert_eq!(unit.fraction(5), Rational::new(5, 6));
+/// assert_eq!(unit.to_integer(&times[0]), Some(3));
+/// assert_eq!(unit.to_integer(&Rational::new(1, 4)), None);
+/// assert_eq!(unit.to_fraction(5), Rational::new(5, 6));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CommonDenominator(i64);

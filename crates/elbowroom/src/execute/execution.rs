@@ -96,7 +96,7 @@ pub fn execute(
 ///             let observations = coming.extract_if(.., |it| it.time <= now).collect();
 ///             run.observe(TimeAdvance { now, observations })?;
 ///         }
-///         Next::Look { .. } => run.see(Vec::new())?,
+///         Next::Look { .. } => run.observe_requested(Vec::new())?,
 ///         Next::Over(report) => break report,
 ///         // A plan is to be made, or prepared: these workers answer at once.
 ///         request => run.delegate(request, &mut *workers),

@@ -26,7 +26,7 @@ use super::read_goal;
 ///     .recorded_by(recorder)
 ///     .run_in(&mut SimWorld::new(Arc::clone(&task), &model, 0));
 /// assert_eq!(report.verdict.name(), "goal-reached");
-/// assert!(validation.found().is_empty());
+/// assert!(validation.findings().is_empty());
 /// ```
 pub struct Validated<'a, R> {
     inner: R,

@@ -16,7 +16,7 @@
 //!
 //! let task = Task::new(Problem::default());
 //! let execution = Execution::new(&task);
-//! assert_eq!(execution.reaches(task.goal()), Some(true));
+//! assert_eq!(execution.reaches_goal(task.goal()), Some(true));
 //! ```
 
 mod present_state;
