@@ -48,7 +48,7 @@ mod tests {
         }
         let output = Command::new(env::current_exe().unwrap())
             .args(["--exact", "--nocapture"])
-            .arg("bug::tests::a_panic_asks_for_a_report_and_ends_with_70")
+            .arg("panic_hook::tests::a_panic_asks_for_a_report_and_ends_with_70")
             .env(CHILD, "1")
             .output()
             .unwrap();

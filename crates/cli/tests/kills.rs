@@ -276,7 +276,7 @@ fn killed(number: u64) -> u64 {
 
 /// Checks that a run ended with its goal.
 fn check_end(folder: &Path, output: &Output, what: &str) {
-    if String::from_utf8_lossy(&output.stdout).contains("has reached its goal before") {
+    if String::from_utf8_lossy(&output.stdout).contains("has already reached its goal") {
         check_robot_records(folder, what, "it was over when it was killed");
     } else {
         check_outcome(folder, output, what);
@@ -368,7 +368,7 @@ fn running_run_cannot_be_resumed_concurrently() {
         let second = awaited(second, "the second");
         let text = String::from_utf8_lossy(&second.stderr).into_owned();
         assert_eq!(second.status.code(), Some(2), "{text}");
-        assert!(text.contains("is under way"), "{text}");
+        assert!(text.contains("has not ended"), "{text}");
     }
     check_outcome(&folder, &awaited(first, "the first"), "the first");
     fs::remove_dir_all(&folder).expect("the folder is there");
@@ -393,7 +393,7 @@ fn finished_journal_is_neither_overwritten_nor_resumed() {
     let resumed = elbowroom(&["run", "--resume", &journal]);
     let text = String::from_utf8_lossy(&resumed.stdout).into_owned();
     assert_eq!(resumed.status.code(), Some(0), "{resumed:?}");
-    assert!(text.contains("has reached its goal before"), "{text}");
+    assert!(text.contains("has already reached its goal"), "{text}");
     // The journal is also a valid trace.
     let report = elbowroom(&["report", &journal]);
     assert!(report.status.success(), "{report:?}");

@@ -222,7 +222,7 @@ fn third_ctrl_c_ends_the_run_at_once_and_the_second_does_not() {
 #[test]
 fn planner_failure_cancels_actions_and_stops_the_world() {
     let planners = [
-        ("none", 1, "no plan to go on with", "no-plan"),
+        ("none", 1, "no plan to continue with", "no-plan"),
         (
             "false {domain} {problem}",
             2,

@@ -15,8 +15,8 @@ use std::path::{Path, PathBuf};
 const ALLOWED_CYCLES: &[(&str, &[&str], &str)] = &[
     (
         "elbowroom",
-        &["answers", "execute", "flow"],
-        "`flow::robust_plan` is a line over the answer, which is put together from the flow's steps, \
+        &["answers", "execute", "pipeline"],
+        "`pipeline::robust_plan` is a line over the answer, which is built by the steps of the pipeline, \
          as what is executed is; a run is an answer too",
     ),
     (

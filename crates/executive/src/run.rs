@@ -191,7 +191,7 @@ impl<'a> RunInputs<'a> {
             let why = file.failure().unwrap_or_default();
             return Err(RunError::Failed(Error::new(
                 format!("cannot write the journal {}: {why}", file.path().display()),
-                "nothing was started; make room on the disk, or choose another file",
+                "nothing was started; free some disk space, or choose another file",
             )));
         }
         let health = JournalHealth::default();

@@ -213,7 +213,12 @@ fn run_in_failed_world_is_resumed_in_another_one() {
 
     let resumed = Executive::resume(&journal, settings.clone()).expect("a journal");
     let locked = Executive::resume(&journal, settings.clone()).err();
-    assert!(locked.expect("locked").to_string().contains("under way"));
+    assert!(
+        locked
+            .expect("locked")
+            .to_string()
+            .contains("has not ended")
+    );
     let error = resumed.run().expect_err("its world is missing");
     assert!(error.to_string().contains("in the process"), "{error}");
     drop(resumed);

@@ -55,7 +55,7 @@ pub(super) fn prepare(
     let command = command(planner, &found, &workspace, settings).map_err(|error| {
         not_started(
             format!("its folder cannot be filled: {error}"),
-            "make room on the disk",
+            "free some disk space",
         )
     })?;
     Ok((question, workspace, command))

@@ -150,7 +150,7 @@ fn a_wrong_action_is_shown_with_what_is_expected() {
       |
       = help: did you mean `b1`?
 
-    error: `hall` cannot stand for ?b of `snap`: it is not of type ball
+    error: `hall` cannot be bound to ?b of `snap`: it is not of type ball
      --> plan:3:5
       |
     3 | 2: (snap hall)

@@ -227,10 +227,10 @@ fn global_constraints_hold_in_each_state() {
 #[test]
 fn errors_in_processes_and_events_suggest_a_fix() {
     let read = |text: &str| mistakes(read_actions(text));
-    assert_snapshot!(read("(:process p :precondition (lit) :effect (lit))"), @"domain.pddl:6:41: error: `(lit)` is no change that goes on; effects of a process are `(increase (f) (* #t rate))`");
+    assert_snapshot!(read("(:process p :precondition (lit) :effect (lit))"), @"domain.pddl:6:41: error: `(lit)` is no continuous change; effects of a process are `(increase (f) (* #t rate))`");
     assert_snapshot!(read("(:process p :effect (at start (lit)))"), @"domain.pddl:6:21: error: `(at …)` does not belong here; a process has no start and no end of its own");
     assert_snapshot!(read("(:process p :effect (when (lit) (increase (level) (* #t 1))))"), @"domain.pddl:6:21: error: a conditional effect of a process; write a process of its own, with the condition as its precondition");
-    assert_snapshot!(read("(:process p :effect (increase (level) 1))"), @"domain.pddl:6:21: error: `(increase …)` is no change that goes on; effects of a process are `(increase (f) (* #t rate))`");
+    assert_snapshot!(read("(:process p :effect (increase (level) 1))"), @"domain.pddl:6:21: error: `(increase …)` is no continuous change; effects of a process are `(increase (f) (* #t rate))`");
     assert_snapshot!(read("(:event e :effect (increase (level) (* #t 1)))"), @"domain.pddl:6:40: error: `#t` means nothing here; it belongs into effects of processes, and into continuous effects of durative actions, which stand outside of `at start` and `at end`");
     assert_snapshot!(read("(:event)"), @"domain.pddl:6:2: error: an event without a name; expected `(:event name …)`");
     assert_snapshot!(read("(:event e :condition (lit) :effect (not (lit)))"), @"domain.pddl:6:11: error: unknown keyword `:condition` in event `e`; did you mean `:precondition`?");

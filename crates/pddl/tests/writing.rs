@@ -232,7 +232,7 @@ fn situation_inexpressible_by_timed_initials_is_refused_with_reason() {
     let (_, task) = rover();
     let situation = running_situation(&task, "0: (bask) [5]", 1, Interval::point(5.into()));
     let without = write_problem(&task, &situation, &ProblemText::default()).unwrap_err();
-    assert_snapshot!(without, @"1 actions are under way, but 0 ends are given for them");
+    assert_snapshot!(without, @"1 actions are running, but 0 ends are given for them");
     let ends = vec![Rational::from(7)];
     let how = ProblemText { ends, digits: None };
     let impossible = write_problem(&task, &situation, &how).unwrap_err();

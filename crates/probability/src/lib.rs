@@ -26,7 +26,7 @@
 //! use elbowroom_model::Task;
 //! use elbowroom_pddl::{Source, read_plan, read_problem};
 //! use elbowroom_plan::partial_order::partial_order;
-//! use elbowroom_probability::dispatch::patient;
+//! use elbowroom_probability::dispatch::never_interrupt;
 //! use elbowroom_probability::{
 //!     SearchState, Likelihoods, Model, OrderSearch, SearchSettings, Semantics,
 //! };
@@ -56,7 +56,7 @@
 //! let initial = SearchState::initial(&task);
 //! let model = Model::new(task, plan, &likelihoods, Semantics::Paper)?;
 //! let mut search = OrderSearch::new(Arc::new(model), SearchSettings::default());
-//! let found = search.best_order(&initial, &mut patient)?;
+//! let found = search.best_order(&initial, &mut never_interrupt)?;
 //! // It starts, the lamp stays whole for one step, and the effect takes place.
 //! let order = found.order.ok_or("there is a way")?;
 //! assert!((order.probability - 0.5 * 0.75 * 0.9).abs() < 1e-12);

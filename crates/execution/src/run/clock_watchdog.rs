@@ -110,7 +110,7 @@ mod tests {
         let why = (0..=MAX_ANSWERS)
             .find_map(|_| progress.count_answer(&Rational::ZERO, 0).err())
             .expect("the clock does not advance");
-        assert!(why.ends_with("understood: `hello`: not JSON"), "{why}");
+        assert!(why.ends_with("parsed: `hello`: not JSON"), "{why}");
     }
 
     #[test]

@@ -43,16 +43,16 @@ pub struct ExecutorServices<'m> {
 pub const EXECUTORS: &[ExecutorEntry] = &[
     ExecutorEntry {
         name: "esterel",
-        summary: "The baseline: happenings as soon as the network allows, failed starts again \
-                  without limit, a new plan when a condition is false.",
+        summary: "The baseline: happenings as soon as the network allows, failed starts \
+                  repeated without limit, a new plan when a condition is false.",
         paper: "the Esterel Dispatcher of ROSPlan, in Ribeiro et al. (2021), section 3",
         construct: |means| Ok(Box::new(Esterel::new(Arc::clone(&means.task)))),
     },
     ExecutorEntry {
         name: "adaptable",
-        summary: "The paper's PGen and PExec. What is under way is ended before a plan is given \
-                  up. In a dead end, where there is no other plan, it does what its plan has the \
-                  best chance with, relying on spontaneous changes.",
+        summary: "The paper's PGen and PExec. Running actions are ended before a plan is \
+                  abandoned. In a dead end, where there is no other plan, it takes the \
+                  most promising actions of its plan and relies on spontaneous changes.",
         paper: "Olisipo in Ribeiro et al. (2021), sections 2.2.1 and 2.2.2",
         construct: |means| {
             let (task, likelihoods) = means.task_and_likelihoods();
@@ -65,9 +65,9 @@ pub const EXECUTORS: &[ExecutorEntry] = &[
     },
     ExecutorEntry {
         name: "as-published",
-        summary: "The authors' program: the last order found instead of the best, and no second \
-                  search. When its order no longer fits, it does nothing more (theirs did a \
-                  little, to no avail).",
+        summary: "The authors' program: the last order found instead of the best, and no \
+                  second search. When its order no longer fits, it does nothing more (the \
+                  authors' program did a little, without effect).",
         paper: "the program behind the results of Ribeiro et al. (2021)",
         construct: |means| {
             let (task, likelihoods) = means.task_and_likelihoods();
@@ -76,8 +76,9 @@ pub const EXECUTORS: &[ExecutorEntry] = &[
     },
     ExecutorEntry {
         name: "lookahead",
-        summary: "The optimal policy in the sound world (`docs/probability.md`), without regard to \
-                  the plan. It is exact where at most `most_running` actions are under way at once.",
+        summary: "The optimal policy in the sound world (`docs/probability.md`), \
+                  regardless of the plan. It is exact if at most `most_running` actions \
+                  run at once.",
         paper: "goes beyond Ribeiro et al. (2021)",
         construct: |means| Ok(Box::new((means.foresight)()?)),
     },

@@ -215,7 +215,7 @@ function legend(chart) {
     has((bar) => bar.starts) ? entry("may start", ...whisker("starts")) : null,
     has((bar) => bar.ends) ? entry("may end", ...whisker("ends")) : null,
     chart.marks.some((mark) => !mark.is_event) ? entry("fact or number changes by itself", shape("path", { class: "diamond", d: "M14 3l5 5l-5 5l-5 -5z" })) : null,
-    chart.marks.some((mark) => mark.is_event) ? entry("plan given up", shape("line", { class: "event", x1: 14, x2: 14, y1: 1, y2: 15 }), shape("path", { class: "crossing", d: "M14 3l5 5l-5 5l-5 -5z" })) : null);
+    chart.marks.some((mark) => mark.is_event) ? entry("plan abandoned", shape("line", { class: "event", x1: 14, x2: 14, y1: 1, y2: 15 }), shape("path", { class: "crossing", d: "M14 3l5 5l-5 5l-5 -5z" })) : null);
 }
 
 // The moments as text: names are cut off in the chart.

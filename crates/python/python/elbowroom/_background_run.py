@@ -72,7 +72,7 @@ class BackgroundRun:
         self._late = concluded(self._run, raised, failure, lifecycle)
         if lost is not None:
             raise ExecutiveError(
-                f"the journal cannot be written: {lost}; make room on the disk, and resume the run from it",
+                f"the journal cannot be written: {lost}; free some disk space, and resume the run from it",
                 self._run,
             )
 
