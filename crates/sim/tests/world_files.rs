@@ -235,7 +235,7 @@ fn invalid_numbers_are_rejected() {
         (
             "[[duration]]\naction = \"go\"\nvalues = [1, \"a\"]\n",
             5,
-            "where a number belongs",
+            "expected a number",
         ),
     ];
     for (sections, line, words) in cases {

@@ -88,7 +88,7 @@ impl fmt::Display for ViolationKind {
             Self::TooEarly(earliest) => write!(f, "starts before time {}", decimal(earliest)),
             Self::Abandoned(action) => write!(
                 f,
-                "the plan must continue {action}, which is running, from its beginning"
+                "the plan must begin by continuing {action}, which is running"
             ),
             Self::Elapsed {
                 duration,

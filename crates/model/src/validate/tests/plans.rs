@@ -302,7 +302,7 @@ fn plan_in_mid_execution_continues_running_actions() {
     };
     assert_eq!(said(&situation, &rest), "true");
     let abandoned = said(&situation, &TimeTriggeredPlan::default());
-    assert!(abandoned.contains("going on with (drain)"), "{abandoned}");
+    assert!(abandoned.contains("continuing (drain)"), "{abandoned}");
     // Drained below 2 at 3, when x must be at least 2 all the time.
     let mut long = rest.clone();
     long.steps[0].duration = Some(Rational::from(4));
