@@ -87,7 +87,7 @@ def test_action_that_the_new_world_does_not_know_has_failed(tmp_path: Path, worl
         executive.fact("(idle rover)")
         executive.unpause()
         assert executive.wait(executive.submit(HOME, name="again"), HANG)
-    why = "the world knows nothing" if world is Lasting else "the world cannot say"
+    why = "the world knows nothing" if world is Lasting else "the world does not know its outcome"
     assert sum(why in line for line in executive.stop().trace_text.splitlines()) > 0
     # A world that knows of the earlier process receives a cancellation. A new one has nothing to cancel.
     cancelled = getattr(robot, "cancelled", None)
@@ -137,10 +137,10 @@ def test_journals_are_checked(tmp_path: Path) -> None:
             lambda: Executive(*CASE, world=Depot(), journal=journal),
             lambda: Executive.resume(journal, Depot()),
         ):
-            with pytest.raises(elbowroom.ExecutiveError, match="under way"):
+            with pytest.raises(elbowroom.ExecutiveError, match="has not ended"):
                 make()
         done = python("from test_resumption import *\nExecutive.resume(sys.argv[1], Depot())", journal)
-        assert "ExecutiveError" in done.stderr and "under way" in done.stderr
+        assert "ExecutiveError" in done.stderr and "has not ended" in done.stderr
     with pytest.raises(elbowroom.ExecutiveError, match="a journal .* already"):
         Executive(*CASE, world=Depot(), journal=journal)
     with pytest.raises(elbowroom.ExecutiveError, match="cannot read"):
