@@ -285,7 +285,7 @@ def a_plan_is_asked_for_and_executed(stage):
     assert set(executed["actions"]) == {"(move r1 shed gate):0", "(move r2 barn gate):0", "(signal r1 gate):2000"}
     assert all(status == 4 for status, _ in executed["actions"].values())
     assert said["idle"] == 3 * ["no plan is being executed"]
-    assert said["known"] is None and stage.program.count("no problem expert is there") == 1
+    assert said["known"] is None and stage.program.count("there is no problem expert") == 1
     assert said["followed"] == [True, sorted(executed["actions"])], "tools can follow"
     # The performers' process and the client. The program does not publish node information, on
     # which nodes of another distribution abort.
