@@ -4,7 +4,8 @@
 //! not hold, and no other goal is open or the executive is idle because no plan reaches these, all
 //! goals to keep are pursued together. So the plan preserves the ones that hold. If no plan reaches
 //! all of them, some are selected as usual, and the others are queued with the reason until
-//! something is observed. So goals to keep that exclude each other are not achieved alternately.
+//! something is observed or the goals change. So goals to keep that exclude each other are not
+//! achieved alternately.
 
 use elbowroom_num::Rational;
 
@@ -61,6 +62,15 @@ impl Run<'_> {
     pub(super) fn has_conflicting_goals(&self) -> bool {
         let mut queued = self.goal_manager.iter().flat_map(|it| &it.queued);
         queued.any(|goal| goal.wait == Wait::Conflict)
+    }
+
+    /// Lets the goals to keep that excluded each other be tried again, because the situation or the
+    /// goals have changed.
+    pub(super) fn retry_conflicting_goals(&mut self) {
+        let queued = self.goal_manager.iter_mut().flat_map(|it| &mut it.queued);
+        for goal in queued.filter(|goal| goal.wait == Wait::Conflict) {
+            (goal.wait, goal.set_aside) = (Wait::Release, None);
+        }
     }
 
     /// Evaluates the queued goals to keep. Pursues them if one does not hold and no other goal is

@@ -313,12 +313,8 @@ impl<'a> Run<'a> {
     fn wake(&mut self) {
         if let Some(lasting) = &mut self.goal_manager {
             lasting.idle_since = None;
-            for goal in &mut lasting.queued {
-                if goal.wait == Wait::Conflict {
-                    (goal.wait, goal.set_aside) = (Wait::Release, None);
-                }
-            }
         }
+        self.retry_conflicting_goals();
         self.pursue_all();
     }
 

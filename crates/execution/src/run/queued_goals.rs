@@ -14,6 +14,7 @@ impl Run<'_> {
     /// Adds a goal, which replaces the goal of the same name. It is queued if its release time is
     /// in the future.
     pub(super) fn add_goal(&mut self, given: OpenGoal) -> Remark {
+        self.retry_conflicting_goals();
         let Some(lasting) = &mut self.goal_manager else {
             return None;
         };
@@ -46,6 +47,7 @@ impl Run<'_> {
 
     /// Abandons the goal of this name.
     pub(super) fn abandon_goal(&mut self, name: &str) -> Remark {
+        self.retry_conflicting_goals();
         let Some(lasting) = &mut self.goal_manager else {
             return None;
         };

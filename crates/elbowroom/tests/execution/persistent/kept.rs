@@ -144,6 +144,27 @@ fn goals_to_keep_that_exclude_each_other_are_not_achieved_alternately() {
 }
 
 #[test]
+fn conflicting_goal_to_keep_is_pursued_once_the_other_is_abandoned() {
+    let task = task("", "(have book)");
+    let script = vec![
+        (20, keep("without", "(not (have key))")),
+        (30, keep("with", "(have key)")),
+        (90, abandon("without")),
+    ];
+    let told = run(&task, 200, script);
+    assert_has(
+        &told,
+        &[
+            "`with` queued",
+            "90: `with` pursued again",
+            "90: start (fetch r key)",
+            "100: `with` kept",
+        ],
+    );
+    assert_eq!(told.report.starts, 2, "{:#?}", told.notes);
+}
+
+#[test]
 fn goal_to_keep_has_a_release_time_and_no_deadline() {
     let task = task("", "(have book)");
     let terms = GoalTerms {
