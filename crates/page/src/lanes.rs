@@ -43,7 +43,7 @@ pub(crate) fn lanes<'a>(
         chosen: 0,
         of: vec![Vec::new(); occupants.len()],
     };
-    let mut best: Option<f64> = None;
+    let mut best: Option<(f64, usize)> = None;
     for kind in kinds(occupants, type_of) {
         let keys: Vec<Option<(usize, &str)>> = occupants
             .iter()
@@ -173,22 +173,25 @@ fn objects(name: &str) -> impl Iterator<Item = &str> {
 }
 
 /// Rates a grouping. Each action with an object of the kind adds 1 / (1 + its position among the
-/// arguments), and subtracts 1 if it overlaps an earlier action on the same lane.
+/// arguments), and subtracts 1 if it overlaps an earlier action on the same lane. Each other action
+/// subtracts 1. The second number is that of actions with an object of the kind.
 #[allow(
     clippy::cast_precision_loss,
     reason = "positions of arguments are small"
 )]
-fn score(occupants: &[Occupant<'_>], keys: &[Option<(usize, &str)>]) -> f64 {
+fn score(occupants: &[Occupant<'_>], keys: &[Option<(usize, &str)>]) -> (f64, usize) {
     let mut order: Vec<usize> = (0..occupants.len())
         .filter(|&it| occupants[it].counts)
         .collect();
     order.sort_by(|&a, &b| occupants[a].time.0.total_cmp(&occupants[b].time.0));
     let mut busy: BTreeMap<&str, f64> = BTreeMap::new();
-    let mut score = 0.0;
+    let (mut score, mut covered) = (0.0, 0);
     for index in order {
         let Some((position, object)) = keys[index] else {
+            score -= 1.0;
             continue;
         };
+        covered += 1;
         let (start, end) = occupants[index].time;
         let until = busy.entry(object).or_insert(f64::NEG_INFINITY);
         score += 1.0 / (1.0 + position as f64);
@@ -197,7 +200,7 @@ fn score(occupants: &[Occupant<'_>], keys: &[Option<(usize, &str)>]) -> f64 {
         }
         *until = until.max(end);
     }
-    score
+    (score, covered)
 }
 
 #[cfg(test)]
@@ -244,6 +247,32 @@ mod tests {
         let occupants =
             ["(serve a r1)", "(serve a r2)", "(serve a r3)"].map(|name| occupant(name, (0.0, 9.0)));
         let type_of = |object: &str| Some(if object == "a" { "place" } else { "robot" });
+        let lanes = lanes(&occupants, &type_of);
+        assert_eq!(lanes.groupings[lanes.chosen].name, "robot");
+    }
+
+    #[test]
+    fn initial_lanes_hold_most_actions() {
+        let names = [
+            "(load k1 r1)",
+            "(load k2 r1)",
+            "(drive r1 a b)",
+            "(unload k1 r1)",
+            "(unload k2 r1)",
+        ];
+        let times = [0.0, 2.0, 4.0, 6.0, 8.0];
+        let occupants: Vec<_> = names
+            .iter()
+            .zip(times)
+            .map(|(name, start)| occupant(name, (start, start + 1.0)))
+            .collect();
+        let type_of = |object: &str| {
+            Some(if object.starts_with('k') {
+                "crate"
+            } else {
+                type_of(object)?
+            })
+        };
         let lanes = lanes(&occupants, &type_of);
         assert_eq!(lanes.groupings[lanes.chosen].name, "robot");
     }

@@ -25,9 +25,15 @@ function showGoal(card, goal, now) {
   }
   let terms = `since ${nearest(goal.since)}`;
   if (goal.given !== undefined) terms += `, given at ${nearest(goal.given)}`;
+  if (goal.by !== undefined) terms += ` by ${goal.by}`;
+  if (goal.keep) terms += ", to be kept";
+  if (goal.release !== undefined) {
+    terms += `, from ${nearest(goal.release)}`;
+    if (goal.release > now) terms += ` (${distance(goal.release, now)})`;
+  }
   if (goal.value !== 1) terms += `, value ${nearest(goal.value)}`;
   if (goal.deadline !== undefined) {
-    terms += `, by ${nearest(goal.deadline)}`;
+    terms += `, deadline ${nearest(goal.deadline)}`;
     if (!isClosed(goal)) terms += ` (${distance(goal.deadline, now)})`;
   }
   setText(part(card, "terms"), terms);

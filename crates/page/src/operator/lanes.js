@@ -118,9 +118,10 @@ function showLanes(state, now, isChanged) {
   reconcile(byId("lanes"), sorted, (it) => it.name, laneItem, (node, it) => showLane(node, it, now));
   byId("no-lane").hidden = sorted.length > 0;
   for (const id of ["axis", "legend"]) byId(id).hidden = sorted.length === 0;
-  // The axis shows what is open, up to the end of the longest lane that fits.
+  // The axis shows all that is open; if nothing is, the action that ended last.
   const ahead = Math.max(0, ...actions.filter((it) => it.kind === "running" || it.kind === "to-come").map((it) => it.end - now));
-  const wanted = ahead / (1 - PAST) * 0.8;
+  const last = actions.filter((it) => it.end <= now).sort((a, b) => a.end - b.end).at(-1);
+  const wanted = ahead > 0 || !last ? ahead / (1 - PAST) * 0.8 : (now - last.start) / PAST;
   const span = SPANS.find((it) => it >= wanted) ?? SPANS.at(-1);
   drawAxis(span);
   for (const node of byId("lanes").children) drawStrip(node, now - PAST * span, span);
