@@ -366,7 +366,10 @@ mod tests {
         assert!(refused("</a>").starts_with("text:1:1: error: `</a>` has no matching start tag"));
         assert!(refused("<a b=c/>").starts_with("text:1:6: error: this value has no quotes"));
         assert!(refused("<a b/>").contains("neither an attribute"));
-        assert!(refused("<a>&x;</a>").starts_with("text:1:4: error: this `&` begins no character"));
+        assert!(
+            refused("<a>&x;</a>")
+                .starts_with("text:1:4: error: this `&` does not begin a known character")
+        );
         assert!(refused("<!-- a").contains("this comment has no end"));
         assert!(refused("a <b/>").contains("text outside of all elements"));
         assert!(refused(&"<a>".repeat(100_000)).contains("nested too deeply"));
