@@ -107,7 +107,7 @@ fn every_command_gives_the_verdict_of_check_and_points_to_repairs() {
         for (code, said) in verdicts([&domain, &problem, &plan], options) {
             assert_eq!(code, Some(expected), "{name}: {said}");
             assert_eq!(said.contains("--repair"), expected == 1, "{name}: {said}");
-            let is_noted = said.contains("as printed: taken as rounded");
+            let is_noted = said.contains("which are assumed to be rounded");
             assert_eq!(is_noted, expected == 0 && name != "exact", "{name}: {said}");
         }
     }

@@ -37,7 +37,7 @@ pub enum BoxTextError {
         nearest: Option<String>,
     },
     /// The name is ambiguous.
-    #[error("`{name}` could mean {}: write which", choices.join(", "))]
+    #[error("`{name}` is ambiguous: write {}", choices.join(", "))]
     Ambiguous {
         /// The name.
         name: String,

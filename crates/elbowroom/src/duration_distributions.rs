@@ -11,20 +11,21 @@ use elbowroom_sim::{Distribution, Rule, WorldModel};
 pub enum DistributionError {
     /// There is no world file.
     #[error(
-        "the objective `probability` needs a world file, which says how long actions take; give one, or \
-         choose another objective"
+        "the objective `probability` needs a world file with distributions of durations; give \
+         one, or choose another objective"
     )]
     NoWorld,
     /// A parameter is no duration.
     #[error(
-        "the objective `probability` is about durations, and {0} is none; leave it out of what may \
-         deviate, or choose another objective"
+        "the objective `probability` supports durations only, not {0}; do not vary it, or choose \
+         another objective"
     )]
     NoDuration(String),
     /// No best box can be proved for the distribution of this duration.
     #[error(
-        "the objective `probability` cannot be told for a gamma distribution, which the world has for the \
-         duration of {0}; use a normal or lognormal one, measured `values`, or another objective"
+        "the objective `probability` does not support gamma distributions, which the world has \
+         for the duration of {0}; use a normal or lognormal one, measured `values`, or another \
+         objective"
     )]
     Gamma(String),
     /// A parameter of a distribution is not a finite number.

@@ -20,8 +20,8 @@ use elbowroom_plan::{
 use elbowroom_stn::{ConsistentNetwork, Constraint};
 
 /// The reason for a finite end without a limit.
-pub const ANY_FINITE: &str = "every greater finite deviation is inside as well, but no times \
-    fixed in advance suit all of them";
+pub const ANY_FINITE: &str = "every greater finite deviation is inside as well, but no fixed \
+                              schedule is valid for all of them";
 
 /// Describes results about one plan in words.
 #[derive(Clone, Copy, Debug)]

@@ -79,8 +79,8 @@ pub enum ExportError {
     Refused(Refusal),
     /// A bound has to hold for an unbounded parameter.
     #[error(
-        "a bound of the plan has to hold whatever the value of {parameter} is, and that has no \
-         limit: give its interval an end"
+        "a bound of the plan must hold for all values of {parameter}, but its interval is \
+         unbounded: give finite bounds"
     )]
     Unlimited {
         /// The parameter's name.
@@ -88,7 +88,7 @@ pub enum ExportError {
     },
     /// The box of the answer has other parameters.
     #[error(
-        "the answer is about other parameters than this plan has ({}): give the same domain, \
+        "the parameters of the answer differ from those of this plan ({}): give the same domain, \
          problem, plan and --vary as for the answer",
         difference
     )]
@@ -97,7 +97,7 @@ pub enum ExportError {
         difference: String,
     },
     /// The answer has no box.
-    #[error("the answer has no box: the plan fails, or the search had found nothing yet")]
+    #[error("the answer has no box: the plan fails, or the search was stopped before it found one")]
     NoBox,
 }
 
@@ -139,7 +139,7 @@ pub fn box_of(
         }
         if theirs.nominal != ours.nominal {
             let (name, theirs, ours) = (&ours.name, &theirs.nominal, &ours.nominal);
-            return differs(format!("{name} is {theirs} as planned, not {ours}"));
+            return differs(format!("nominal value of {name}: {theirs}, not {ours}"));
         }
     }
     let intervals = ranges.iter().map(|range| elbowroom_num::Interval {

@@ -181,8 +181,8 @@ fn propose_certificate(
         Err(closed_set::Failure::TooMany) => Err("there are too many states to list".to_owned()),
         Err(closed_set::Failure::Unknown(why)) => Err(why),
         Err(closed_set::Failure::Reachable) => Err(
-            "the verifier's rules leave the goal in reach: they do not count the least separation of \
-             happenings, nor numbers and alternatives that have to hold throughout actions"
+            "the goal is reachable by the verifier's rules, which ignore the least separation of \
+             happenings, and over-all conditions with numbers or alternatives"
                 .to_owned(),
         ),
     }
@@ -194,7 +194,7 @@ fn add_reachable(
     effort: &mut Effort<'_>,
 ) -> Result<ReachedFacts, String> {
     let too_many =
-        || "there are too many instances of actions to list the facts they reach".to_owned();
+        || "there are too many instances of actions to list the reachable facts".to_owned();
     let mut reached = ReachedFacts::new();
     let mut looks = 0;
     loop {
@@ -220,4 +220,4 @@ fn add_reachable(
     }
 }
 
-const EFFORT_IS_SPENT: &str = "the limit on time or work was reached before it was made";
+const EFFORT_IS_SPENT: &str = "the limit on time or work was reached first";

@@ -456,11 +456,11 @@ fn warning(source: &Source, printed: &PrintedPlan, violation: &Violation) -> Dia
     let step = violation.action.as_ref().map(|action| action.step);
     let place = step.and_then(|step| printed.steps.get(step));
     let place = place.map_or(0..0, |own| own.place.clone());
-    let message = format!("{violation}, as printed: taken as rounded");
+    let message = format!("{violation} with the printed numbers, which are assumed to be rounded");
     let mut warning = Diagnostic::new(Severity::Warning, source, place, message);
     warning.advise(
-        "the plan is valid with numbers within one unit of the last printed digit, which are taken; \
-         `--tolerance 0` takes the numbers as printed",
+        "the plan is valid with numbers within one unit of the last printed digit, which are \
+         used; `--tolerance 0` uses the printed numbers",
     );
     warning
 }

@@ -167,7 +167,7 @@ pub(crate) enum Side {
 
 /// The task or the world has features without a timed optimum.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{what}; the optimum without foresight is only calculated without that")]
+#[error("{what}; the optimum without foresight does not support this")]
 pub struct NotTabulated {
     /// The unsupported feature.
     pub what: String,

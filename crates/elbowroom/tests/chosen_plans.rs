@@ -238,7 +238,7 @@ fn uncertain_amounts_yield_plans_for_scarcer_amounts() {
     );
     let filled = plans
         .iter()
-        .find(|it| it.made_for == "for charge as scarce as in all but 20 of 100 cases");
+        .find(|it| it.made_for == "for charge scarcer than in 80 % of cases");
     let filled = filled.expect("there is time to fill it up");
     let first = |name: &str| {
         let names = starts(&filled.plan);

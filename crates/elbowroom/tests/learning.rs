@@ -496,7 +496,11 @@ fn expected_and_observed_changes_are_both_reported() {
         })
         .collect();
     let refused = asked(&without_facts, &world).expect_err("tables tell nothing of facts");
-    assert!(refused.to_string().contains("tables of attempts do not"));
+    assert!(
+        refused
+            .to_string()
+            .contains("tables of attempts contain no facts")
+    );
     let wrong = world.replace("\"unlocked\"", "\"unlokced\"");
     let refused = asked(&logs, &wrong).expect_err("no such predicate");
     assert!(refused.to_string().contains("unlocked"), "{refused}");

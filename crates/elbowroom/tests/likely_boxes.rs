@@ -236,7 +236,7 @@ fn unknown_probability_is_rejected_with_advice() {
     ];
     if let Err(refused) = envelope(&deadline, &mut NoObserver) {
         assert!(
-            refused.to_string().contains("is about durations"),
+            refused.to_string().contains("supports durations only"),
             "{refused}"
         );
     } else {

@@ -166,8 +166,8 @@ fn an_end_without_limit_and_a_deadline_contradict_each_other() {
     let refused = analyze(&file, &request).expect_err("no upper bound");
     assert_eq!(
         refused.to_string(),
-        "the link from `A` to `C` has no upper bound, so no duration can be drawn evenly; draw \
-         durations as the file says"
+        "the link from `A` to `C` has no upper bound, so its durations cannot be drawn uniformly; \
+         draw them from the distributions of the file"
     );
 }
 

@@ -55,7 +55,7 @@ impl ControlConflict {
 
 impl fmt::Display for ControlConflict {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("an executor would have to know durations in advance that it observes too late")
+        f.write_str("an executor would have to know durations before it observes them")
     }
 }
 

@@ -73,27 +73,27 @@ pub enum RegionSource {
 pub enum ExactError {
     /// A condition is not linear.
     #[error(
-        "a condition multiplies quantities that are left open, so that the region has no flat \
-         sides; leave less open"
+        "a condition multiplies open quantities, so the region is not polyhedral; vary fewer \
+         quantities"
     )]
     NotLinear {
         /// The position of the requirement; `None` if it is a bound of the network.
         requirement: Option<usize>,
     },
     /// The elimination takes too many inequalities.
-    #[error("the region takes more than {limit} inequalities at once; leave less open")]
+    #[error("the region needs more than {limit} inequalities; vary fewer quantities")]
     TooManyRows {
         /// Limit on the number kept.
         limit: usize,
     },
     /// Too many polyhedra.
-    #[error("the region falls into more than {limit} pieces; leave less open")]
+    #[error("the region has more than {limit} pieces; vary fewer quantities")]
     TooManyPieces {
         /// Limit on the number kept.
         limit: usize,
     },
     /// The caller ended the computation.
-    #[error("the region was not done when there was no more time")]
+    #[error("the time limit was reached before the region was complete")]
     Stopped,
 }
 

@@ -13,7 +13,7 @@ pub enum Objection {
     #[error("for some values in the box the plan has no schedule")]
     NoSchedule(Valuation),
     /// For some values, some schedule violates an obligation.
-    #[error("for some values in the box a schedule breaks the plan")]
+    #[error("for some values in the box the plan has an invalid schedule")]
     Broken(Broken),
     /// There is a schedule for all values, but it depends on values that are not known in time.
     #[error("{0}")]

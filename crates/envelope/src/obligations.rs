@@ -183,7 +183,7 @@ pub enum Refusal {
         expression: String,
     },
     /// A rate changes while it is active.
-    #[error("{place}: the rate of change of {fluent} depends on something that changes later on")]
+    #[error("{place}: the rate of change of {fluent} depends on a value that changes later")]
     ChangingRate {
         /// Location in the plan or problem.
         place: String,
@@ -211,15 +211,15 @@ pub enum Refusal {
         place: String,
     },
     /// A number is left open that is not one of the plan's parameters.
-    #[error("{place}: a number is left open that is no parameter; vary it or give it a value")]
+    #[error("{place}: an open number is not a parameter; vary it or give it a value")]
     OpenNumber {
         /// Location in the plan or problem.
         place: String,
     },
     /// The ends of a parameter's interval do not decide the values between them.
     #[error(
-        "parameter {name} is multiplied by itself, or by a time that it also bounds, or with \
-         several numbers of one condition; give it a value, or vary one of these only"
+        "parameter {name} is multiplied by itself, by a time that it bounds, or by several \
+         numbers of one condition; give it a value, or vary only one of these factors"
     )]
     Coupled {
         /// The parameter.
@@ -275,7 +275,7 @@ impl Requirement {
             }
             Self::SingleUpdate { node, fluent } => {
                 format!(
-                    "{} must not change {} in several ways at once",
+                    "{} must not change {} in several ways at the same time",
                     plan.describe_node(task, *node),
                     task.fluent_name(*fluent)
                 )

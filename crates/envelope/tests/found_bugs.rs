@@ -163,7 +163,7 @@ fn happening_must_not_change_number_in_two_ways() {
     };
     assert_eq!(
         given.answer(""),
-        "(set) must not change (x) in several ways at once"
+        "(set) must not change (x) in several ways at the same time"
     );
 }
 

@@ -280,7 +280,7 @@ fn unsupported_features_are_rejected_by_name() {
     let chosen = go.replace("(= ?duration 2)", "(<= ?duration 2)");
     assert_eq!(
         refused(&chosen, ""),
-        "(go) has a duration that is to be chosen"
+        "(go) has a duration that the plan chooses"
     );
     assert_eq!(
         refused(go, "[[delay]]\naction = \"*\"\nconstant = 1"),
@@ -291,7 +291,7 @@ fn unsupported_features_are_rejected_by_name() {
             go,
             "[[hazard]]\nfact = \"a\"\nbecomes_false_per_second = 0.1\nreported = false"
         ),
-        "the world has facts that change at a rate and does not report it"
+        "the world has facts that change at a rate without being reported"
     );
     let outcome = |when: &str, rest: &str| {
         format!(
@@ -332,8 +332,7 @@ fn a_goal_that_a_timed_initial_changes_is_refused() {
     let found = optimum(&task, &model, &Settings::default(), &|| true);
     assert_eq!(
         found.expect_err("it is refused").what,
-        "a timed initial changes what the goal reads, so that the goal is not reached as soon as it \
-         holds"
+        "a timed initial changes a fact of the goal, so the goal is not yet reached when it holds"
     );
 }
 

@@ -64,7 +64,7 @@ impl Builder {
             report.mistake(
                 at,
                 format!("there are two time points `{name}`"),
-                "give each a name of its own",
+                "give each a unique name",
             );
             return;
         }
@@ -130,7 +130,7 @@ impl Builder {
             Bound::Finite(lower) if !lower.is_negative() => lower,
             Bound::Finite(_) => {
                 report.remark(format!(
-                    "{words} may not take less than no time: its lower bound is taken as 0"
+                    "{words} has a negative lower bound: 0 is used instead"
                 ));
                 Rational::ZERO
             }
@@ -160,7 +160,7 @@ impl Builder {
             report.mistake(
                 at,
                 format!("the contingent link from `{begin_name}` ends where it begins"),
-                "a link leads from one time point to another",
+                "a link connects two different time points",
             );
             return None;
         }
@@ -170,7 +170,7 @@ impl Builder {
             report.mistake(
                 at,
                 format!("two contingent links end at `{end_name}`"),
-                "each needs an end of its own",
+                "give each a different end",
             );
             return None;
         }
@@ -217,7 +217,7 @@ impl Builder {
                 report.mistake(
                     self.places[place_of(&bad).index()],
                     "this contingent link depends on its own end",
-                    "begin each link at a time point that happens before",
+                    "begin each link at a time point before its end",
                 );
                 return None;
             }
@@ -250,7 +250,7 @@ fn place_of(bad: &BadLink) -> LinkId {
 fn unreachable_bound(at: usize, report: &mut Report) {
     report.mistake(
         at,
-        "no difference of times is as large as that",
+        "infinite bound with the wrong sign",
         "a lower bound may be -inf and an upper bound inf, not the other way round",
     );
 }

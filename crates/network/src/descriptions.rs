@@ -49,7 +49,7 @@ impl NetworkFile {
             Some(upper) => {
                 format!("{end} may come as late as {} after {begin}", decimal(upper))
             }
-            None => format!("{end} may come as late as one likes after {begin}"),
+            None => format!("{end} may come arbitrarily late after {begin}"),
         }
     }
 

@@ -80,7 +80,9 @@ pub(crate) fn parse<'a>(text: &'a str, report: &mut Report) -> Option<Json<'a>> 
     let read = reader.value(0).and_then(|value| {
         reader.skip_space();
         if reader.at < text.len() {
-            return Err(reader.syntax_error("there is more text after the document", "remove it"));
+            return Err(
+                reader.syntax_error("unexpected text after the end of the document", "remove it")
+            );
         }
         Ok(value)
     });
@@ -289,8 +291,8 @@ impl<'a> Reader<'a> {
                     _ => {
                         self.at = at + offset;
                         return Err(self.syntax_error(
-                            "this is no escape sequence",
-                            "write two backslashes for one",
+                            "unknown escape sequence",
+                            "write `\\\\` for a backslash",
                         ));
                     }
                 },

@@ -71,8 +71,8 @@ fn detect_format(name: &str, text: &str, report: &mut Report) -> Option<NetworkF
         Some(_) if is_trace(first) => {
             report.mistake(
                 start,
-                "these are execution traces, not a network",
-                "give the network that they come from",
+                "this file contains execution traces, not a network",
+                "give the network of these traces",
             );
             None
         }
@@ -83,9 +83,9 @@ fn detect_format(name: &str, text: &str, report: &mut Report) -> Option<NetworkF
         Some(_) => {
             report.mistake(
                 start,
-                "this is no format of networks that is known",
-                "known are JSON, GraphML, plain STNU text that begins with `# KIND OF NETWORK`, \
-                 and DIMACS text",
+                "unrecognised network format",
+                "expected JSON, GraphML, plain STNU text that begins with `# KIND OF NETWORK`, or \
+                 DIMACS text",
             );
             None
         }
@@ -128,9 +128,9 @@ fn detect_json_format(text: &str, report: &mut Report) -> Option<NetworkFile> {
     }
     report.mistake(
         document.at,
-        "this JSON describes no network of a known form",
-        "known are `nodes` and `constraints` (HEATlab), `timepoints` and `constraints` (PSTN-lib), \
-         lists of inequalities under the numbers of nodes, and `\"format\": \"elbowroom-network\"`",
+        "this JSON is not a network of a known format",
+        "expected `nodes` and `constraints` (HEATlab), `timepoints` and `constraints` (PSTN-lib), \
+         lists of inequalities under the numbers of nodes, or `\"format\": \"elbowroom-network\"`",
     );
     None
 }
@@ -157,7 +157,7 @@ fn required<'j, 'a>(parent: &'j Json<'a>, name: &str, report: &mut Report) -> Op
     if member.is_none() {
         report.mistake(
             parent.at,
-            format!("`{name}` is missing here"),
+            format!("missing member `{name}`"),
             format!("add `\"{name}\": …`"),
         );
     }
@@ -174,7 +174,7 @@ fn bound(json: &Json<'_>, report: &mut Report) -> Option<Bound> {
     if read.is_none() {
         report.mistake(
             json.at,
-            "this is no number",
+            "this is not a number",
             "write a decimal such as 12.5, a fraction such as \"25/2\", \"inf\" or \"-inf\"",
         );
     }
@@ -248,8 +248,8 @@ fn correlation_matrix(
     }
     report.mistake(
         parent.at,
-        "this is no correlation matrix of these durations",
-        "it has a row and a column for each, is symmetric, and has 1 in its diagonal",
+        "this is not a correlation matrix of these durations",
+        "expected a symmetric matrix with a row and a column for each, and 1 in its diagonal",
     );
     None
 }

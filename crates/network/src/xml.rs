@@ -182,13 +182,13 @@ impl Reader<'_> {
         };
         let Some(element) = closed else {
             return self.syntax_error(
-                format!("`</{name}>` closes nothing"),
-                "remove it, or open the element before",
+                format!("`</{name}>` has no matching start tag"),
+                "remove it, or add the start tag before it",
             );
         };
         if element.name != name {
             return self.syntax_error(
-                format!("`</{name}>` stands where `</{}>` should", element.name),
+                format!("expected `</{}>`, found `</{name}>`", element.name),
                 "close the innermost element first",
             );
         }
@@ -209,7 +209,10 @@ impl Reader<'_> {
         let name = self.name();
         if name.is_empty() {
             self.at = begin;
-            return self.syntax_error("this `<` begins no tag", "write `&lt;` for the character");
+            return self.syntax_error(
+                "this `<` does not begin a tag",
+                "write `&lt;` for the character",
+            );
         }
         let mut element = Element {
             at: begin,
@@ -293,7 +296,7 @@ impl Reader<'_> {
             let Some((letter, length)) = known else {
                 self.at = end - rest.len() - 1;
                 return self.syntax_error(
-                    "this `&` begins no character that is known",
+                    "this `&` does not begin a known character reference",
                     "write `&amp;` for the character itself",
                 );
             };
@@ -357,14 +360,16 @@ mod tests {
     #[test]
     fn syntax_errors_have_positions() {
         assert!(
-            refused("<a>\n<b></a>")
-                .starts_with("text:2:4: error: `</a>` stands where `</b>` should")
+            refused("<a>\n<b></a>").starts_with("text:2:4: error: expected `</b>`, found `</a>`")
         );
         assert!(refused("<a>").contains("the element `a` is not closed"));
-        assert!(refused("</a>").starts_with("text:1:1: error: `</a>` closes nothing"));
+        assert!(refused("</a>").starts_with("text:1:1: error: `</a>` has no matching start tag"));
         assert!(refused("<a b=c/>").starts_with("text:1:6: error: this value has no quotes"));
         assert!(refused("<a b/>").contains("neither an attribute"));
-        assert!(refused("<a>&x;</a>").starts_with("text:1:4: error: this `&` begins no character"));
+        assert!(
+            refused("<a>&x;</a>")
+                .starts_with("text:1:4: error: this `&` does not begin a known character")
+        );
         assert!(refused("<!-- a").contains("this comment has no end"));
         assert!(refused("a <b/>").contains("text outside of all elements"));
         assert!(refused(&"<a>".repeat(100_000)).contains("nested too deeply"));

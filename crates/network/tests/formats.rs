@@ -51,7 +51,7 @@ fn nodes_and_constraints() {
     3 at most 20000 after 1
     3 at least 1 after 1
     2 may come as early as 2000 after 1, 2 may come as late as 3000 after 1
-    3 may come as early as 0 after 2, 3 may come as late as one likes after 2
+    3 may come as early as 0 after 2, 3 may come arbitrarily late after 2
     ");
     let normal = Duration::Normal {
         mean: Rational::from(4500),
@@ -70,8 +70,8 @@ fn time_points_with_labels_that_repeat_and_correlations() {
     // 1000000000 is that library's infinity.
     insta::assert_snapshot!(words(&file), @r"
     start not after (drive a)_end #2
-    (drive a)_end may come as early as 0 after start, (drive a)_end may come as late as one likes after start
-    (drive a)_end #2 may come as early as 0 after start, (drive a)_end #2 may come as late as one likes after start
+    (drive a)_end may come as early as 0 after start, (drive a)_end may come arbitrarily late after start
+    (drive a)_end #2 may come as early as 0 after start, (drive a)_end #2 may come arbitrarily late after start
     ");
 }
 
@@ -280,46 +280,46 @@ fn mistakes_have_position_and_advice() {
         &[("hello", ""), ("hello", "goodbye"), ("hello", "{}")],
     );
     insta::assert_snapshot!(messages.join("\n"), @r###"
-    f.json:5:49: error: this type of constraint is not known; known are "stc", "stcu" and "pstc"
-    f.json:7:57: error: the distribution `X_4.5_0.5` is not known; known are N_mean_deviation, U_from_to, E_rate_from and G_shape_(rate,from)
-    f.json:5:73: error: this is no number; write a decimal such as 12.5, a fraction such as "25/2", "inf" or "-inf"
+    f.json:5:49: error: unknown type of constraint; expected "stc", "stcu" or "pstc"
+    f.json:7:57: error: unknown distribution `X_4.5_0.5`; expected N_mean_deviation, U_from_to, E_rate_from or G_shape_(rate,from)
+    f.json:5:73: error: this is not a number; write a decimal such as 12.5, a fraction such as "25/2", "inf" or "-inf"
     f.json:5:5: error: the contingent link from `1` to `2` has a lower bound above its upper bound; write the smaller number first; durations are not negative
-    f.json:2:96: error: there are two time points `3`; give each a name of its own
+    f.json:2:96: error: there are two time points `3`; give each a unique name
     f.json:4:38: error: there is no time point `1`; list it with the others, or correct the name
     f.json:5:20: error: there is no time point `1`; list it with the others, or correct the name
     f.json:8:20: error: there is no time point `1`; list it with the others, or correct the name
     f.json:8:38: error: there is no time point `7`; list it with the others, or correct the name
-    f.json:6:5: error: the contingent link from `3` ends where it begins; a link leads from one time point to another
+    f.json:6:5: error: the contingent link from `3` ends where it begins; a link connects two different time points
     f.json:4:75: error: expected `,` or `}`, found `;`; the file may be cut off or a comma missing
-    f.stnu:9:1: error: this contingent edge has no counterpart; a contingent link is one edge there and one back
-    f.stnu:10:88: error: this value is no number; write a number
-    f.stnu:9:1: error: this contingent edge and its counterpart do not say which node is the end; the value of the edge from the end back to the beginning is negative or 0
-    f.stnu:11:1: error: this contingent edge has no counterpart; a contingent link is one edge there and one back
-    f.stnu:12:95: error: `UC(D)` is no labelled value; write `LC(C):4` or `UC(C):-7`, where C is the end of a contingent link
-    f.stnu:15:1: error: this wait is for no contingent link that begins at the edge's target; `UC(C):-7` on an edge to A needs a contingent link from A to C
-    f.stnu:11:1: error: this contingent edge has no counterpart; a contingent link is one edge there and one back
-    f.stnu:12:1: error: this contingent edge has no counterpart; a contingent link is one edge there and one back
-    f.stnu:16:1: error: `</graphml>` stands where `</graph>` should; close the innermost element first
+    f.stnu:9:1: error: this contingent edge has no counterpart; a contingent link consists of one edge in each direction
+    f.stnu:10:88: error: this value is not a number; write a number
+    f.stnu:9:1: error: this contingent edge and its counterpart do not define which node is the end; the value of the edge from the end to the beginning must be negative or 0
+    f.stnu:11:1: error: this contingent edge has no counterpart; a contingent link consists of one edge in each direction
+    f.stnu:12:95: error: `UC(D)` is not a labelled value; write `LC(C):4` or `UC(C):-7`, where C is the end of a contingent link
+    f.stnu:15:1: error: no contingent link for this wait begins at the edge's target; `UC(C):-7` on an edge to A needs a contingent link from A to C
+    f.stnu:11:1: error: this contingent edge has no counterpart; a contingent link consists of one edge in each direction
+    f.stnu:12:1: error: this contingent edge has no counterpart; a contingent link consists of one edge in each direction
+    f.stnu:16:1: error: expected `</graph>`, found `</graphml>`; close the innermost element first
     f.plainstnu:12:1: error: there is no time point `Y`; list it with the others, or correct the name
-    f.plainstnu:12:3: error: `a` is no number; write a decimal such as 12.5
-    f.plainstnu:15:1: error: this is no contingent link; write `A 1 3 C`: C comes 1 to 3 after A
-    f.plainstnu:6:1: error: the file says that there are 2 ordinary edges, but has none; the file may be cut off
-    f.plainstnu:11:1: error: this heading is not known; known are the kind of network, the numbers and the names of time points, ordinary edges and contingent links
-    f.txt:8:1: error: there is no node 4; nodes count from 1 to what the line `p sp NODES ARCS` says
+    f.plainstnu:12:3: error: `a` is not a number; write a decimal such as 12.5
+    f.plainstnu:15:1: error: this is not a contingent link; write `A 1 3 C`: C comes 1 to 3 after A
+    f.plainstnu:6:1: error: the file announces 2 ordinary edges, but contains none; the file may be cut off
+    f.plainstnu:11:1: error: unknown heading; expected the kind of network, or the numbers or names of time points, ordinary edges and contingent links
+    f.txt:8:1: error: there is no node 4; nodes are numbered from 1 to NODES of the line `p sp NODES ARCS`
     f.txt:1:1: error: there is no problem line; add `p sp NODES ARCS` before the arcs
     f.json:6:22: error: the deviation is negative; write it without its sign
-    f.json:13:7: error: this is none of the probabilistic constraints, or one that was named before; list it under `constraints` with its distribution
-    f.json:12:20: error: this is no correlation matrix of these durations; it has a row and a column for each, is symmetric, and has 1 in its diagonal
-    f.json:10:40: error: this is no number; write a decimal such as 12.5, a fraction such as "25/2", "inf" or "-inf"
-    f.json:1:8: error: this is no inequality; write `[u, v, w]` for `v - u <= w`
+    f.json:13:7: error: this is not one of the probabilistic constraints, or it is listed twice; list it under `constraints` with its distribution
+    f.json:12:20: error: this is not a correlation matrix of these durations; expected a symmetric matrix with a row and a column for each, and 1 in its diagonal
+    f.json:10:40: error: this is not a number; write a decimal such as 12.5, a fraction such as "25/2", "inf" or "-inf"
+    f.json:1:8: error: this is not an inequality; write `[u, v, w]` for `v - u <= w`
     f.json:1:72: error: there is no time point `7`; list it with the others, or correct the name
-    f.json:1:45: error: this version of the format is not known; version 1 is read
-    f.json:7:18: error: the distribution `beta` is not known; known are normal, uniform, exponential and gamma
-    f.json:9:13: error: this wait is for no end of a contingent link; name the end of a link under `until`
-    f.json:7:18: error: the numbers of this distribution make no sense; deviations and means are not negative, shapes and scales positive, and from <= to
+    f.json:1:45: error: unsupported version of the format; expected version 1
+    f.json:7:18: error: unknown distribution `beta`; expected normal, uniform, exponential or gamma
+    f.json:9:13: error: this wait does not refer to the end of a contingent link; name the end of a link under `until`
+    f.json:7:18: error: the numbers of this distribution are invalid; deviations and means must not be negative, shapes and scales must be positive, and from <= to
     f:1:1: error: the file is empty; give a file with a network
-    f:1:1: error: this is no format of networks that is known; known are JSON, GraphML, plain STNU text that begins with `# KIND OF NETWORK`, and DIMACS text
-    f:1:1: error: this JSON describes no network of a known form; known are `nodes` and `constraints` (HEATlab), `timepoints` and `constraints` (PSTN-lib), lists of inequalities under the numbers of nodes, and `"format": "elbowroom-network"`
+    f:1:1: error: unrecognised network format; expected JSON, GraphML, plain STNU text that begins with `# KIND OF NETWORK`, or DIMACS text
+    f:1:1: error: this JSON is not a network of a known format; expected `nodes` and `constraints` (HEATlab), `timepoints` and `constraints` (PSTN-lib), lists of inequalities under the numbers of nodes, or `"format": "elbowroom-network"`
     "###);
 }
 

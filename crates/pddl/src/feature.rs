@@ -83,7 +83,7 @@ impl Feature {
             Self::OtherSections => {
                 "`:length`, `:time` and unknown sections: ignored with a warning"
             }
-            Self::UnknownRequirements => "requirement flags not known: ignored with a warning",
+            Self::UnknownRequirements => "unknown requirement flags: ignored with a warning",
         }
     }
 }

@@ -36,7 +36,7 @@ pub struct ProblemText {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum WriteProblemError {
     /// The number of ends differs from that of running actions.
-    #[error("{running} actions are running, but {ends} ends are given for them")]
+    #[error("{running} actions are running, but {ends} end times are given")]
     EndCount {
         /// The number of actions that are running.
         running: usize,
@@ -44,13 +44,13 @@ pub enum WriteProblemError {
         ends: usize,
     },
     /// An action ends now, or is overdue.
-    #[error("{action} would end now or earlier: let its end happen, and plan from the state after")]
+    #[error("{action} would end now or earlier: apply its end, and plan from the resulting state")]
     EndsNow {
         /// The action.
         action: String,
     },
     /// The end is not possible.
-    #[error("{action} cannot end at {end}: it may take {possible} from its start")]
+    #[error("{action} cannot end at {end}: its duration must be {possible}")]
     Impossible {
         /// The action.
         action: String,
@@ -61,14 +61,13 @@ pub enum WriteProblemError {
     },
     /// The course of the plan is constrained, and has begun.
     #[error(
-        "a problem file cannot say what has been so far, which the problem's constraints on the \
-         course of the plan depend on"
+        "a problem file cannot express the states so far, on which the problem's trajectory \
+         constraints depend"
     )]
     UnknownPast,
     /// The effects at the end of the action, or until then, are not known in advance.
     #[error(
-        "a problem file cannot say that {action} is under way: {why}; \
-         the embedded planner takes it as it is"
+        "a problem file cannot express that {action} is running: {why}; use the embedded planner"
     )]
     Inexpressible {
         /// The action.

@@ -72,7 +72,7 @@ fn violated_constraint_is_reported_with_time_and_reason() {
     );
     assert_snapshot!(
         constraints("(and (sometime (open hall)) (sometime-before (in b1 hall) (open kitchen)))"),
-        @"at 4.000: the constraint (sometime-before (in b1 hall) (open kitchen)) is violated: (in b1 hall) holds, and (open kitchen) never did before"
+        @"at 4.000: the constraint (sometime-before (in b1 hall) (open kitchen)) is violated: (in b1 hall) holds, but (open kitchen) never held before"
     );
 }
 
@@ -87,8 +87,8 @@ fn violated_preferences_are_counted_in_the_metric() {
     assert_snapshot!(verdict_on(sections, PLAN), @r"
     valid, 1119
     light at 1: (lit) does not hold over all
-    shut at 9: (at end (not (open kitchen))): (not (open kitchen)) does not hold in the end
-    opened at 9: (at end (open hall)): (open hall) does not hold in the end
+    shut at 9: (at end (not (open kitchen))): (not (open kitchen)) does not hold at the end
+    opened at 9: (at end (open hall)): (open hall) does not hold at the end
     soon at 3: (within 3 (in b1 hall)): (in b1 hall) does not hold until 3
     ");
 }
@@ -133,7 +133,7 @@ fn a_written_problem_has_the_same_constraints() {
         ..Situation::initial(&first)
     };
     let error = write_problem(&first, &later, &ProblemText::default()).unwrap_err();
-    assert!(error.to_string().contains("what has been so far"));
+    assert!(error.to_string().contains("the states so far"));
 }
 
 #[test]
@@ -151,14 +151,14 @@ fn meaningless_constraints_are_errors() {
             "(:init) (:goal (and)) (:constraints {text})"
         )))
     };
-    assert!(wrong("(lit)").contains("does not say when it must hold"));
-    assert!(wrong("(not (always (lit)))").contains("does not say when it must hold"));
-    assert!(wrong("(always (sometime (lit)))").contains("do not nest"));
+    assert!(wrong("(lit)").contains("is not a trajectory constraint"));
+    assert!(wrong("(not (always (lit)))").contains("is not a trajectory constraint"));
+    assert!(wrong("(always (sometime (lit)))").contains("cannot be nested"));
     assert!(wrong("(within (lit))").contains("expected `(within time condition)`"));
     assert!(wrong("(within soon (lit))").contains("unknown function `soon`"));
     assert!(wrong("(hold-during 3 2 (lit))").contains("must be later"));
     assert!(wrong("(within -1 (lit))").contains("a time below 0"));
-    assert!(wrong("(allways (lit))").contains("does not say when it must hold"));
+    assert!(wrong("(allways (lit))").contains("is not a trajectory constraint"));
     let nested = wrong("(preference p (preference q (always (lit))))");
     assert!(nested.contains("a preference is not allowed here"));
 }
@@ -166,7 +166,7 @@ fn meaningless_constraints_are_errors() {
 #[test]
 fn misplaced_forms_are_reported_with_their_proper_place() {
     let sections = "(:init) (:goal (and)) (:constraints (sometime (always (lit))))";
-    assert_snapshot!(mistakes(read_sections(sections)), @"problem.pddl:2:48: error: `(always …)` does not belong here; trajectory constraints belong under `:constraints`, and do not nest");
-    assert_snapshot!(mistakes(read_actions("(:action a :precondition (within 3 (lit)))")), @"domain.pddl:6:27: error: `(within …)` does not belong here; trajectory constraints belong under `:constraints`, and do not nest");
-    assert_snapshot!(mistakes(read_actions("(:action a :effect (preference p (lit)))")), @"domain.pddl:6:21: error: `(preference …)` does not belong here; preferences stand among conditions, in goals and under `:constraints`");
+    assert_snapshot!(mistakes(read_sections(sections)), @"problem.pddl:2:48: error: `(always …)` does not belong here; trajectory constraints are allowed only under `:constraints`, and not inside each other");
+    assert_snapshot!(mistakes(read_actions("(:action a :precondition (within 3 (lit)))")), @"domain.pddl:6:27: error: `(within …)` does not belong here; trajectory constraints are allowed only under `:constraints`, and not inside each other");
+    assert_snapshot!(mistakes(read_actions("(:action a :effect (preference p (lit)))")), @"domain.pddl:6:21: error: `(preference …)` does not belong here; preferences are allowed in conditions, in goals and under `:constraints`");
 }

@@ -55,10 +55,10 @@ fn validator_uses_chosen_control_numbers() {
 
 #[test]
 fn missing_or_malformed_control_number_is_reported() {
-    assert_snapshot!(verdict_on("0: (withdraw ann 10) [2]"), @"plan:1:5: error: `withdraw` chooses 1 of its 2 numbers here; expected `(withdraw ?p - person ?cash - number ?fee - number)`, with the numbers behind the objects");
+    assert_snapshot!(verdict_on("0: (withdraw ann 10) [2]"), @"plan:1:5: error: `withdraw` chooses 1 of its 2 numbers here; expected `(withdraw ?p - person ?cash - number ?fee - number)`, with the numbers after the objects");
     assert_snapshot!(verdict_on("0: (withdraw ann ten 0) [2]"), @"plan:1:18: error: `ten` is not a number: write a decimal such as 12.5 or a fraction such as 25/2");
     assert_snapshot!(mistakes(read_actions("(:action a :control (?n ?n - number))")), @"domain.pddl:6:25: error: `?n` is declared twice");
     assert_snapshot!(mistakes(read_actions("(:action a :synth-parameters (?n) :control (?n))")), @"domain.pddl:6:44: error: `?n` is declared twice");
-    assert_snapshot!(mistakes(read_actions("(:action a :parameters (?n - room) :control (?n))")), @"domain.pddl:6:45: error: `?n` is a parameter already; a number that the plan chooses needs a name of its own");
+    assert_snapshot!(mistakes(read_actions("(:action a :parameters (?n - room) :control (?n))")), @"domain.pddl:6:45: error: `?n` is a parameter already; give each number that the plan chooses a unique name");
     assert_snapshot!(mistakes(read_actions("(:action a :control (?r - room))")), @"domain.pddl:6:27: error: an unknown of type `room`; `:synth-parameters` are numbers");
 }

@@ -50,7 +50,7 @@ fn missing_time_specifier_is_reported() {
     assert_snapshot!(
         rendered("(:durative-action a :duration (= ?duration 1) :condition (lit) :effect (at end (not (lit))))"),
         @r"
-    error: `(lit)` does not say when it must hold
+    error: `(lit)` has no time specifier
      --> domain.pddl:6:58
       |
     6 | (:durative-action a :duration (= ?duration 1) :condition (lit) :effect (at end (not (lit)))))
@@ -73,9 +73,9 @@ fn every_mistake_of_an_action_is_reported() {
     domain.pddl:6:48: error: `(= …)` does not bound the duration; expected `(= ?duration value)`, `(<= ?duration value)` or `(and …)` of such
     domain.pddl:7:34: error: unknown predicate `blue`; declare it under `:predicates`
     domain.pddl:8:40: error: unknown object `nowhere`; declare it under `:objects` or `:constants`
-    domain.pddl:8:50: error: `(lit)` does not say when it happens; expected `(at start …)` or `(at end …)`, or for continuous change `(increase (f) (* #t rate))`
-    domain.pddl:8:56: error: `(at …)` does not say when it happens; did you mean `at start`?
-    domain.pddl:9:47: error: unknown number `?z`; numbers that stay open are declared under `:synth-parameters`
+    domain.pddl:8:50: error: `(lit)` has no time specifier; expected `(at start …)` or `(at end …)`, or for continuous change `(increase (f) (* #t rate))`
+    domain.pddl:8:56: error: `(at …)` has no time specifier; did you mean `at start`?
+    domain.pddl:9:47: error: unknown number `?z`; declare open numbers under `:synth-parameters`
     ");
 }
 
@@ -128,7 +128,7 @@ fn effect_that_depends_on_later_condition_is_refused() {
     let found = mistakes(read_actions(
         "(:durative-action a :duration () :effect (when (at end (lit)) (at start (open hall))))",
     ));
-    assert_snapshot!(found, @"domain.pddl:6:48: error: a condition that is read after its effect happens; only effects `at end` may depend on conditions `at end`");
+    assert_snapshot!(found, @"domain.pddl:6:48: error: the condition is read after its effect happens; only effects `at end` may depend on conditions `at end`");
 }
 
 #[test]
@@ -139,7 +139,7 @@ fn derived_predicates_cannot_be_set_nor_negate_themselves() {
          (:action a :effect (lit))",
     ));
     assert_snapshot!(found, @r"
-    domain.pddl:8:29: error: `lit` is defined by rules, and cannot be set; change what its rules depend on
+    domain.pddl:8:29: error: `lit` is a derived predicate and cannot be set; change the facts that its rules read
     domain.pddl:6:11: error: `lit` depends on its own negation; a derived predicate may not be negated in its own definition
     domain.pddl:7:20: error: `dark` depends on its own negation; a derived predicate may not be negated in its own definition
     ");
@@ -158,7 +158,7 @@ fn negation_of_other_derived_predicate_is_allowed() {
 fn a_type_cannot_be_its_own_supertype() {
     let domain = Source::new("d", "(define (domain d) (:types a - b b - c c - a d - a))");
     let problem = problem("(:init) (:goal (and))");
-    assert!(mistakes(read_problem(&domain, &problem)).contains("subtype of itself"));
+    assert!(mistakes(read_problem(&domain, &problem)).contains("is in a cycle of subtypes"));
 }
 
 #[test]
@@ -227,8 +227,8 @@ fn diagnostics_of(sections: &str) -> String {
 
 #[test]
 fn a_timed_initial_without_parentheses_shows_its_form() {
-    assert_snapshot!(diagnostics_of("(:init (at 120 not (lit))) (:goal (lit))"), @"problem:1:43: error: this timed initial cannot be understood; write `(at 120 (not (lit)))`");
-    assert_snapshot!(diagnostics_of("(:init (at 120 lit)) (:goal (lit))"), @"problem:1:43: error: this timed initial cannot be understood; write `(at 120 (p …))`, `(at 120 (not (p …)))` or `(at 120 (= (f …) 5))`");
+    assert_snapshot!(diagnostics_of("(:init (at 120 not (lit))) (:goal (lit))"), @"problem:1:43: error: invalid timed initial; write `(at 120 (not (lit)))`");
+    assert_snapshot!(diagnostics_of("(:init (at 120 lit)) (:goal (lit))"), @"problem:1:43: error: invalid timed initial; write `(at 120 (p …))`, `(at 120 (not (p …)))` or `(at 120 (= (f …) 5))`");
 }
 
 #[test]
@@ -238,7 +238,7 @@ fn decimal_comma_is_reported() {
 
 #[test]
 fn goal_on_fluent_without_value_is_reported() {
-    assert_snapshot!(diagnostics_of("(:init) (:goal (and (lit) (>= (speed) 2)))"), @"problem:1:45: warning: the goal reads `(speed)`, which never gets a value; say `(= (speed) …)` under `:init`");
+    assert_snapshot!(diagnostics_of("(:init) (:goal (and (lit) (>= (speed) 2)))"), @"problem:1:45: warning: the goal reads `(speed)`, which never gets a value; write `(= (speed) …)` under `:init`");
     assert_eq!(diagnostics_of("(:init) (:goal (>= (level) 2))"), "");
     assert_eq!(
         diagnostics_of("(:init (= (speed) 1)) (:goal (>= (speed) 2))"),

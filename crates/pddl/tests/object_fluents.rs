@@ -115,7 +115,7 @@ fn error_messages_suggest_a_fix() {
         let domain = Source::new("domain.pddl", DOMAIN);
         mistakes(read_problem(&domain, &problem(&format!("(:goal {goal})"))))
     };
-    assert_snapshot!(read("(position r)"), @"problem.pddl:4:20: error: `position` is a function, and no predicate; compare its value with an object, as in `(= (f) object)`");
+    assert_snapshot!(read("(position r)"), @"problem.pddl:4:20: error: `position` is a function, not a predicate; compare its value with an object, as in `(= (f) object)`");
     assert_snapshot!(read("(> (position r) 3)"), @"problem.pddl:4:23: error: the values of `position` are objects, not numbers; compare it with an object, as in `(= (f) object)`");
     assert_snapshot!(read("(= (position r) 3)"), @"problem.pddl:4:35: error: `3` is a number, not an object; expected the name of an object, or a `?variable`");
     assert_snapshot!(read("(= (position r home) home)"), @"problem.pddl:4:22: error: `position` takes 1 argument, not 2; expected `(position ?r)`");

@@ -237,7 +237,7 @@ fn text_between_actions_is_an_error_with_its_line() {
 
 #[test]
 fn text_that_may_hold_an_action_is_an_error_before_and_after_a_plan() {
-    let possible = "this line may hold an action, but cannot be read as one";
+    let possible = "this line may contain an action, but cannot be read";
     for line in [
         "- 6: (snap b1)",
         "[INFO] 6.0: (snap b1)",

@@ -117,7 +117,7 @@ fn a_missing_duration_is_taken_from_the_domain_only_where_it_is_fixed() {
     1 | 0: (carry b1)
       |     ^^^^^ it depends on `level`, which changes
       |
-      = help: write it behind the action: `[10.000]`
+      = help: write it after the action: `[10.000]`
 
     error: `wait` has no duration here
      --> plan:2:5
@@ -125,7 +125,7 @@ fn a_missing_duration_is_taken_from_the_domain_only_where_it_is_fixed() {
     2 | 1: (wait)
       |     ^^^^ the domain allows more than one duration
       |
-      = help: write it behind the action: `[10.000]`
+      = help: write it after the action: `[10.000]`
     ");
 }
 
@@ -223,9 +223,9 @@ fn lenient_reading_is_reported_as_note() {
     // A unit of time.
     assert_snapshot!(remarks("0: (wait) [9 min]"), @"plan:1:14: warning: `min` is ignored; a duration is a number in brackets, in the domain's unit: `[10.000]`");
     // No brackets.
-    assert_snapshot!(remarks("0: (walk hall kitchen) 4"), @"plan:1:5: warning: read as the terminal of PlanSys2 prints plans: time, action, duration; the usual form is `0.000: (action argument …) [10.000]`");
+    assert_snapshot!(remarks("0: (walk hall kitchen) 4"), @"plan:1:5: warning: read as a plan from the terminal of PlanSys2: time, action, duration; the usual format is `0.000: (action argument …) [10.000]`");
     // No duration at all, reported once.
-    assert_snapshot!(remarks("0: (walk hall kitchen)\n9: (walk kitchen hall)"), @"plan:1:5: warning: `walk` has no duration here: 4 is taken, as the domain says; write it behind the action, as in `[10.000]`; this is said once for all");
+    assert_snapshot!(remarks("0: (walk hall kitchen)\n9: (walk kitchen hall)"), @"plan:1:5: warning: `walk` has no duration here: 4 is used, from the domain; write it after the action, as in `[10.000]`; reported only once");
     // No times.
     assert_snapshot!(remarks("(snap b1)\n(snap b2)"), @"plan:1:2: warning: no action has a time: each starts when the one before it has ended, and 1 later if that takes no time; write the time before the action: `0.000: (action argument …) [10.000]`");
     assert_eq!(

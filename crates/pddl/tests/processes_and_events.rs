@@ -120,13 +120,13 @@ fn endlessly_repeating_event_is_reported_by_name() {
     let init = "(:init) (:goal (and))";
     assert_snapshot!(
         verdict_on("(:event again :precondition (on) :effect (p))", init, "2: (switch-on)"),
-        @"at 2.000: the event (again) happens without end: its effects do not make its precondition false"
+        @"at 2.000: the event (again) happens infinitely often: its effects do not make its precondition false"
     );
     let pair = "(:event there :precondition (on) :effect (and (not (on)) (off)))
         (:event back :precondition (and (off) (q)) :effect (and (not (off)) (on)))";
     assert_snapshot!(
         verdict_on(pair, "(:init (q)) (:goal (and))", "2: (switch-on)"),
-        @"at 2.000: the event (there) happens without end: other events make its precondition true again at once"
+        @"at 2.000: the event (there) happens infinitely often: other events make its precondition true again at the same time"
     );
 }
 
@@ -135,7 +135,7 @@ fn chattering_process_is_reported_by_name() {
     let drain = "(:process drain :precondition (>= (x) 0) :effect (decrease (x) (* #t 1)))";
     assert_snapshot!(
         verdict_on(drain, "(:init (= (x) 2)) (:goal (and))", "5: (switch-on)"),
-        @"undecided: at 2.000: the process (drain) would start and stop without end: at work it makes its condition false, and without it the condition is true"
+        @"undecided: at 2.000: the process (drain) would start and stop infinitely often: it makes its condition false while active, and the condition is true while it is inactive"
     );
 }
 
@@ -177,7 +177,7 @@ fn process_stopped_at_bound_has_exact_value_at_irrational_time() {
     let init = "(:init (on) (= (x) 0) (= (y) 0)) (:goal (> (y) 1))";
     assert_snapshot!(
         verdict_on(&stop, init, "3: (switch-off)"),
-        @"undecided: at 3.000: (> (y) 1) reads (y), whose value is irrational: its change stopped, or went on differently, at an irrational moment"
+        @"undecided: at 3.000: (> (y) 1) reads (y), whose value is irrational: its rate of change changed at an irrational time"
     );
     let reset = format!(
         "{FALL} (:event e :precondition (and (>= (x) 1) (on)) :effect (and (not (on)) (assign (y) 0) (off)))"
@@ -190,7 +190,7 @@ fn a_rate_that_depends_on_its_own_fluent_is_undecided() {
     let grow = "(:process grow :precondition (on) :effect (increase (x) (* #t (x))))";
     assert_snapshot!(
         verdict_on(grow, "(:init (on) (= (x) 1)) (:goal (> (x) 2))", "1: (switch-off)"),
-        @"undecided: at 0.000: nonlinear change: the rate of (x) depends on (x) itself, so its value is no polynomial in time"
+        @"undecided: at 0.000: nonlinear change: the rate of (x) depends on (x) itself, so its value is not a polynomial in time"
     );
 }
 
@@ -202,7 +202,7 @@ fn zeno_behaviour_is_undecided() {
     let init = "(:init (on) (= (x) 0) (= (y) 8)) (:goal (and))";
     assert_snapshot!(verdict_on(bounce, init, "14.5: (switch-off)"), @"valid (x) = 1/4, (y) = 0");
     // The bounces come closer and closer to 16.
-    assert_snapshot!(verdict_on(bounce, init, "17: (switch-off)"), @"undecided: at about 16: events happen, or processes start and stop, more than 1000 times before anything of the plan does");
+    assert_snapshot!(verdict_on(bounce, init, "17: (switch-off)"), @"undecided: at about 16: events happen, or processes start and stop, more than 1000 times before the next happening of the plan");
 }
 
 #[test]
@@ -227,14 +227,14 @@ fn global_constraints_hold_in_each_state() {
 #[test]
 fn errors_in_processes_and_events_suggest_a_fix() {
     let read = |text: &str| mistakes(read_actions(text));
-    assert_snapshot!(read("(:process p :precondition (lit) :effect (lit))"), @"domain.pddl:6:41: error: `(lit)` is no continuous change; effects of a process are `(increase (f) (* #t rate))`");
-    assert_snapshot!(read("(:process p :effect (at start (lit)))"), @"domain.pddl:6:21: error: `(at …)` does not belong here; a process has no start and no end of its own");
-    assert_snapshot!(read("(:process p :effect (when (lit) (increase (level) (* #t 1))))"), @"domain.pddl:6:21: error: a conditional effect of a process; write a process of its own, with the condition as its precondition");
-    assert_snapshot!(read("(:process p :effect (increase (level) 1))"), @"domain.pddl:6:21: error: `(increase …)` is no continuous change; effects of a process are `(increase (f) (* #t rate))`");
-    assert_snapshot!(read("(:event e :effect (increase (level) (* #t 1)))"), @"domain.pddl:6:40: error: `#t` means nothing here; it belongs into effects of processes, and into continuous effects of durative actions, which stand outside of `at start` and `at end`");
+    assert_snapshot!(read("(:process p :precondition (lit) :effect (lit))"), @"domain.pddl:6:41: error: `(lit)` is not a continuous change; effects of a process are `(increase (f) (* #t rate))`");
+    assert_snapshot!(read("(:process p :effect (at start (lit)))"), @"domain.pddl:6:21: error: `(at …)` does not belong here; time specifier in an effect of a process");
+    assert_snapshot!(read("(:process p :effect (when (lit) (increase (level) (* #t 1))))"), @"domain.pddl:6:21: error: a conditional effect of a process; write a separate process with the condition as its precondition");
+    assert_snapshot!(read("(:process p :effect (increase (level) 1))"), @"domain.pddl:6:21: error: `(increase …)` is not a continuous change; effects of a process are `(increase (f) (* #t rate))`");
+    assert_snapshot!(read("(:event e :effect (increase (level) (* #t 1)))"), @"domain.pddl:6:40: error: `#t` is not allowed here; it is defined only in effects of processes, and in continuous effects of durative actions outside of `at start` and `at end`");
     assert_snapshot!(read("(:event)"), @"domain.pddl:6:2: error: an event without a name; expected `(:event name …)`");
     assert_snapshot!(read("(:event e :condition (lit) :effect (not (lit)))"), @"domain.pddl:6:11: error: unknown keyword `:condition` in event `e`; did you mean `:precondition`?");
-    assert_snapshot!(read("(:event e :effect (lit)) (:event e :effect (lit))"), @"domain.pddl:6:34: error: an event `e` is declared already; give each its own name");
+    assert_snapshot!(read("(:event e :effect (lit)) (:event e :effect (lit))"), @"domain.pddl:6:34: error: an event `e` is declared already; give each a unique name");
     assert_snapshot!(read("(:constraint c)"), @"domain.pddl:6:14: error: a constraint `c` without a condition; expected `:condition` and a condition on each state");
 }
 
@@ -245,8 +245,8 @@ fn process_or_event_in_plan_is_refused() {
         "(:init (= (x) 0)) (:goal (and))",
     );
     let read = |plan: &str| mistakes(read_plan(&Source::new("plan", plan), &task));
-    assert_snapshot!(read("1: (e)"), @"plan:1:5: error: `e` is an event; events and processes happen by themselves, and are no steps of plans");
-    assert_snapshot!(read("1: (fill) [3]"), @"plan:1:5: error: `fill` is a process; events and processes happen by themselves, and are no steps of plans");
+    assert_snapshot!(read("1: (e)"), @"plan:1:5: error: `e` is an event; events and processes happen by themselves and cannot be steps of plans");
+    assert_snapshot!(read("1: (fill) [3]"), @"plan:1:5: error: `fill` is a process; events and processes happen by themselves and cannot be steps of plans");
 }
 
 /// `at` is a predicate of many domains.
@@ -262,8 +262,8 @@ fn an_event_and_a_goal_have_no_start_and_no_end() {
             &Source::new("problem.pddl", problem),
         ))
     };
-    assert_snapshot!(read(domain, "(done)"), @"domain.pddl:2:25: error: `(at …)` does not belong here; time specifiers belong into durative actions, and do not nest");
+    assert_snapshot!(read(domain, "(done)"), @"domain.pddl:2:25: error: `(at …)` does not belong here; time specifiers are allowed only in durative actions, and not inside each other");
     let domain = domain.replace("(at start (done))", "(done)");
-    assert_snapshot!(read(&domain, "(at end (done))"), @"problem.pddl:1:67: error: `(at …)` does not belong here; time specifiers belong into durative actions, and do not nest");
+    assert_snapshot!(read(&domain, "(at end (done))"), @"problem.pddl:1:67: error: `(at …)` does not belong here; time specifiers are allowed only in durative actions, and not inside each other");
     assert_snapshot!(read(&domain, "(at start b)"), @"none");
 }

@@ -215,7 +215,7 @@ fn the_earliest_possible_end_is_chosen() {
     assert_eq!(ends(&task, 1, between(3, 8)).unwrap(), "3");
     assert_eq!(ends(&task, 5, between(3, 8)).unwrap(), "5.001");
     let late = ends(&task, 8, between(3, 8)).unwrap_err();
-    assert_snapshot!(late, @"(dig base) would end now or earlier: let its end happen, and plan from the state after");
+    assert_snapshot!(late, @"(dig base) would end now or earlier: apply its end, and plan from the resulting state");
 }
 
 #[test]
@@ -227,16 +227,16 @@ fn situation_inexpressible_by_timed_initials_is_refused_with_reason() {
         let how = ProblemText { ends, digits: None };
         write_problem(&task, &situation, &how).unwrap_err()
     };
-    assert_snapshot!(refusal("0: (bask) [5]"), @"a problem file cannot say that (bask) is under way: it changes (charge) while it runs; the embedded planner takes it as it is");
-    assert_snapshot!(refusal("0: (hope) [5]"), @"a problem file cannot say that (hope) is under way: whether it changes (free) at its end is still open; the embedded planner takes it as it is");
+    assert_snapshot!(refusal("0: (bask) [5]"), @"a problem file cannot express that (bask) is running: it changes (charge) while it runs; use the embedded planner");
+    assert_snapshot!(refusal("0: (hope) [5]"), @"a problem file cannot express that (hope) is running: it is undecided whether it changes (free) at its end; use the embedded planner");
     let (_, task) = rover();
     let situation = running_situation(&task, "0: (bask) [5]", 1, Interval::point(5.into()));
     let without = write_problem(&task, &situation, &ProblemText::default()).unwrap_err();
-    assert_snapshot!(without, @"1 actions are running, but 0 ends are given for them");
+    assert_snapshot!(without, @"1 actions are running, but 0 end times are given");
     let ends = vec![Rational::from(7)];
     let how = ProblemText { ends, digits: None };
     let impossible = write_problem(&task, &situation, &how).unwrap_err();
-    assert_snapshot!(impossible, @"(bask) cannot end at 7: it may take [5, 5] from its start");
+    assert_snapshot!(impossible, @"(bask) cannot end at 7: its duration must be [5, 5]");
 }
 
 #[test]

@@ -75,13 +75,13 @@ pub struct Deordered {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum DeorderError {
     /// The plan violates a constraint on its course.
-    #[error("the plan does not keep the constraint {constraint}")]
+    #[error("the plan violates the constraint {constraint}")]
     ConstraintViolated {
         /// The constraint in PDDL notation.
         constraint: String,
     },
     /// Orders and bounds do not support this feature of the problem.
-    #[error("no network can be made of the plan: networks do not respect {feature} yet")]
+    #[error("the plan cannot be converted to a network: networks do not support {feature} yet")]
     Unsupported {
         /// The feature.
         feature: &'static str,
@@ -98,8 +98,8 @@ pub enum DeorderError {
     },
     /// No schedule satisfies the constraints that keep the plan's order.
     #[error(
-        "the order of the plan leaves no schedule: between {}, interfering happenings cannot all \
-         be {epsilon} apart",
+        "the order of the plan has no schedule: between {}, interfering happenings cannot all be \
+         {epsilon} apart",
         nodes.join(", ")
     )]
     NoSchedule {

@@ -51,7 +51,7 @@ pub fn read(source: impl Into<Source>, task: &Task) -> Result<ParametrizedPlan, 
     let source = source.into();
     let (file, mut mistakes) = syntax::parse(&source);
     if let Some(feature) = task.unsupported_by_boxes() {
-        let message = format!("networks do not respect {feature} yet, which the problem has");
+        let message = format!("the problem has {feature}, which networks do not support yet");
         mistakes.error(0..0, message);
     }
     let plan = resolve::resolve(&file, task, &mut mistakes);

@@ -12,7 +12,7 @@ use crate::likelihoods::Likelihoods;
 
 /// The problem is not supported by worlds without time.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{what}; without time there are only facts, and unconditional effects on them")]
+#[error("{what}; worlds without time support only facts and unconditional effects on them")]
 pub struct Unsupported {
     /// The unsupported feature.
     pub what: String,
@@ -105,7 +105,8 @@ fn spontaneous(task: &Task, likelihoods: &Likelihoods) -> Result<Vec<TimedChange
             let name = &predicate.name;
             return Err(Unsupported {
                 what: format!(
-                    "more than {MAX_SPONTANEOUS} facts change by themselves, those of `{name}` among them"
+                    "more than {MAX_SPONTANEOUS} facts change by themselves, including those of \
+                     `{name}`"
                 ),
             });
         }
@@ -261,7 +262,7 @@ fn grounding(task: &Task) -> Result<Grounding, Unsupported> {
     let Answer::Complete(grounding) =
         reachability::ground(task, &reachability::Settings::default())
     else {
-        return refuse("there are more actions than can be listed");
+        return refuse("there are too many instances of actions to list them");
     };
     if !grounding.rules.is_empty() {
         return refuse("the domain has derived predicates");

@@ -177,7 +177,7 @@ pub struct Likelihoods {
 
 /// A fact, an action or an effect of the problem has no likelihood.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the likelihoods say nothing of {what}; add an entry, or a default")]
+#[error("the likelihoods have no entry for {what}; add one, or a default")]
 pub struct Missing {
     /// A fact, an action, or an effect of an action.
     pub what: String,

@@ -26,8 +26,8 @@ use outcome::Outcome;
 /// A condition couples more facts than can be tracked exactly.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "the success of {happening} depends on {count} uncertain facts at once, which is beyond exact \
-     calculation; at most {most} can be tracked together"
+    "the success of {happening} depends on {count} uncertain facts; exact calculation supports at \
+     most {most}"
 )]
 pub struct TooCoupled {
     /// The happening with the condition or effect.

@@ -92,7 +92,7 @@ impl Default for Settings {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum TabulationError {
     /// Too many states.
-    #[error("{facts} facts and {actions} actions make more states than can be tabulated")]
+    #[error("{facts} facts and {actions} actions have too many states to tabulate")]
     TooManyStates {
         /// Number of relevant facts.
         facts: usize,
@@ -100,7 +100,7 @@ pub enum TabulationError {
         actions: usize,
     },
     /// Numbers, or effects that depend on over-all conditions.
-    #[error("{what}, and such worlds are not tabulated")]
+    #[error("the optimum does not support worlds in which {what}")]
     Unsupported {
         /// The unsupported feature.
         what: String,

@@ -231,15 +231,15 @@ fn mistakes_about_failures_are_reported_with_their_place() {
         ),
         (
             "during_per_second = -1",
-            "text:9:21: error: this is no number of failures per second; a rate, 0 or more",
+            "text:9:21: error: this is not a number of failures per second; a rate, 0 or more",
         ),
         (
             "undone = 1",
-            "text:9:10: error: a number stands here; true or false",
+            "text:9:10: error: found a number; true or false",
         ),
         (
             "undone = true",
-            "text:8:10: error: this says what failures leave behind, but not that an action fails after its start; `end`: how likely its end is to succeed",
+            "text:8:10: error: effects of failures without a probability that the action fails after its start; `end`: how likely its end is to succeed",
         ),
         (
             "ende = 0.5",
@@ -283,7 +283,7 @@ fn mistakes_about_failures_are_reported_with_their_place() {
             &format!(
                 "{outcome}probability = 0.6\nbecomes_true = [\"(open ?d)\"]\n[[actions.shut.outcome]]\nprobability = 0.5\nbecomes_true = [\"(open ?d)\"]"
             ),
-            "error: with this outcome the probabilities add up to 1.1; shares of the failures, so 1 is the most",
+            "error: with this outcome the probabilities add up to 1.1; shares of the failures, at most 1 in total",
         ),
         (
             "[actions.wait]\nend = 0.5",
@@ -291,7 +291,7 @@ fn mistakes_about_failures_are_reported_with_their_place() {
         ),
         (
             "end = 0.5\n[[defaults.outcome]]\nprobability = 0.5\nbecomes_true = [\"(open ?d)\"]",
-            "text:12:17: error: `?d` is a parameter of no action that is named here; [[actions.NAME.outcome]]",
+            "text:12:17: error: `?d` is not a parameter of any action named here; [[actions.NAME.outcome]]",
         ),
     ] {
         let text = format!("{HEAD}{complete}[actions.shut]\n{entry}\n");
@@ -314,11 +314,11 @@ text:1:1: error: the version of the format is missing; version = 1",
         ),
         (
             "format = \"other\"\nversion = 1",
-            "text:1:10: error: this is another kind of file; format = \"elbowroom-likelihoods\"",
+            "text:1:10: error: this is not a likelihood file; format = \"elbowroom-likelihoods\"",
         ),
         (
             "format = \"elbowroom-likelihoods\"\nversion = 2",
-            "text:2:11: error: this version is not known; version = 1",
+            "text:2:11: error: unsupported version; version = 1",
         ),
         (
             "format = ",
@@ -334,7 +334,7 @@ text:1:1: error: the version of the format is missing; version = 1",
         ),
         (
             &format!("{HEAD}{complete}[facts.quiet]\n"),
-            "text:8:8: error: `quiet` follows from rules, so it has no likelihood of its own; state those of the facts that its rules read",
+            "text:8:8: error: `quiet` is a derived predicate, so it cannot have likelihoods; give likelihoods of the facts that its rules read",
         ),
         (
             &format!("{HEAD}{complete}[facts.\"open c\"]\n"),
@@ -378,7 +378,7 @@ text:1:1: error: the version of the format is missing; version = 1",
         ),
         (
             &format!("{HEAD}[facts.open]\n"),
-            "text:1:1: error: the file does not say how likely (shut a) is to start; [actions.shut], or [defaults]",
+            "text:1:1: error: the file does not define how likely (shut a) is to start; [actions.shut], or [defaults]",
         ),
     ] {
         let found = mistakes(text);
@@ -425,7 +425,7 @@ fn the_authors_format_is_read_and_its_mistakes_reported() {
         ),
         (
             "open#a 0 0\n-\n",
-            "text:2:1: error: the file says nothing of (open b); one line for each fact, before this one",
+            "text:2:1: error: the file has no line for (open b); one line for each fact, before this one",
         ),
         (
             &format!("{facts}-\nshut#a 0.75 open%0.5"),

@@ -156,7 +156,7 @@ def test_unknown_names_are_refused() -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"executor": "live:5"}, "must know how the world behaves"),
+        ({"executor": "live:5"}, "needs a model of the world"),
         ({"learn": "experience"}, "the run has none"),
         ({"executor": "nobody"}, "nobody"),
         ({"planner": lambda domain, problem: None}, "planner"),

@@ -23,7 +23,7 @@ use crate::{claim, number, probability};
 #[non_exhaustive]
 pub enum AnswerError {
     /// The text is not an answer of `elbowroom envelope`.
-    #[error("this is no answer of `elbowroom envelope --method best --json`: {0}")]
+    #[error("this is not an answer of `elbowroom envelope --method best --json`: {0}")]
     Unreadable(#[from] serde_json::Error),
     /// The answer has another format, which has no certificate.
     #[error(
@@ -33,15 +33,14 @@ pub enum AnswerError {
     OtherAnswer(String),
     /// The answer has no largest box.
     #[error(
-        "the answer has no largest box, because it was made by another method, nothing may deviate, or \
-         the plan does not work as planned; only answers of `elbowroom envelope --method best --json`, and \
-         of `elbowroom plan --json` that no plan exists, can be verified"
+        "the answer has no largest box, because it comes from another method, no quantity may \
+         deviate, or the nominal plan fails; only answers of `elbowroom envelope --method best \
+         --json`, and of `elbowroom plan --json` that no plan exists, can be verified"
     )]
     NoBox,
     /// The answer has no certificate.
     #[error(
-        "the answer has no certificate: its search was ended before it was done, or some ends could \
-         not be told"
+        "the answer has no certificate: its search was stopped early, or some ends are undecided"
     )]
     NoCertificate,
     /// The check found a flaw.
@@ -262,7 +261,7 @@ pub fn verify_answer_in_world(
     let epsilon = any.settings.epsilon.map(|epsilon| epsilon.exact);
     same(
         epsilon.is_none_or(|epsilon| epsilon == *task.epsilon()),
-        "it is for another least separation (epsilon)",
+        "it has another least separation (epsilon)",
     )?;
     let certificate = answer.best.certificate.as_ref();
     let certificate = certificate.ok_or(AnswerError::NoCertificate)?;
@@ -314,7 +313,7 @@ fn distributed(
         };
         let what = || {
             format!(
-                "the distribution of {}, which is no duration",
+                "the distribution of {}, which is not a duration",
                 parameter.name
             )
         };
@@ -339,7 +338,7 @@ fn initials(answer: &Answer, task: &Task) -> Result<BTreeMap<FluentId, usize>, A
                 let mut fluents = task.initial().values.keys();
                 let fluent =
                     fluents.find(|own| quantity == format!("initial {}", task.fluent_name(**own)));
-                let what = || Flaw::Files(format!("{} is no initial value", room.name));
+                let what = || Flaw::Files(format!("{} is not an initial value", room.name));
                 let known = initials.insert(*fluent.ok_or_else(what)?, parameter);
                 known.map_or(Ok(()), |_| Err(what()))?;
             }

@@ -230,7 +230,7 @@ fn contains_plan(
             || most.as_ref().is_some_and(|most| most < nominal)
             || (quantity.is_time() && !is_time)
         {
-            let what = "the box has negative times, or not the times of the plan";
+            let what = "the box has negative times, or does not contain the times of the plan";
             return Err(NotDerived::differs(what));
         }
     }
@@ -256,7 +256,7 @@ fn assumed(
             rows = Some(own.concat());
         }
         if !numbers::is_implied(rows.as_deref().unwrap_or_default(), sums) {
-            let what = format!("an inequality that the certificate only states ({why})");
+            let what = format!("an inequality that the certificate states without a proof ({why})");
             return Err(NotDerived::Unknown(what));
         }
     }

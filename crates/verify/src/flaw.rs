@@ -21,29 +21,29 @@ pub enum Flaw {
     #[error("{0} {1} is out of range")]
     Range(&'static str, usize),
     /// A proof is valid for another guarantee only.
-    #[error("a proof is about another guarantee")]
+    #[error("a proof is for another guarantee")]
     WrongGuarantee,
     /// A proof uses a duration that the world does not decide.
-    #[error("constraint {0} is no duration that the world decides on")]
+    #[error("constraint {0} is not a duration that the world decides")]
     NotObserved(usize),
     /// An observed constraint is not a duration: it leads from a point to the same point, to time
     /// zero, to the end of another observed duration, or from a point that happens only after it.
     #[error(
-        "constraint {0} is observed, but is no duration from a time point to a later one that nothing \
-         else decides on"
+        "constraint {0} is observed, but is not a duration from a time point to a later one that \
+         no other constraint decides"
     )]
     NoDuration(usize),
     /// The claim or the assumptions do not match the proofs.
-    #[error("`proves` or `assumes` is not what the certificate proves and takes for granted")]
+    #[error("`proves` or `assumes` differs from the statements and assumptions of the certificate")]
     Claim,
     /// A proof uses a bound that does not exist.
-    #[error("a proof uses a bound that is not there")]
+    #[error("a proof uses a bound that does not exist")]
     NoLimit,
     /// A proof has no parts.
     #[error("a proof has no parts")]
     Empty,
     /// The parts of a proof do not form a cycle.
-    #[error("the parts of a proof do not follow each other in a circle")]
+    #[error("the parts of a proof do not form a cycle")]
     NoCycle,
     /// A rule does not apply where it is used.
     #[error("a proof uses a rule where it does not apply")]
@@ -52,7 +52,7 @@ pub enum Flaw {
     #[error("a proof has too many alternatives")]
     TooLong,
     /// It does not follow that a variable is limited.
-    #[error("it does not follow that variable {0} can have no more slack")]
+    #[error("it does not follow that the slack of variable {0} is maximal")]
     NotStopped(usize),
     /// The stated violation of inequalities is wrong.
     #[error(
@@ -60,16 +60,16 @@ pub enum Flaw {
     )]
     Over(usize),
     /// A variable is limited never, or twice.
-    #[error("variable {0} is to be stopped exactly once")]
+    #[error("variable {0} must be limited exactly once")]
     Stopped(usize),
     /// The ways do not form a tree.
     #[error("path {0} is mentioned twice, or before its definition")]
     NoTree(usize),
     /// The cases do not form a tree.
-    #[error("case {0} is reached never or twice")]
+    #[error("case {0} must be reached exactly once")]
     Tree(usize),
     /// A case is split at a value where no probability jumps.
-    #[error("a case is split at a value of variable {0} at which no probability jumps")]
+    #[error("a case is split at a value of variable {0} where no probability is discontinuous")]
     Jump(usize),
     /// A sum of inequalities does not equal the stated bound.
     #[error("the inequalities of case {0} do not add up to its bound")]
@@ -83,31 +83,32 @@ pub enum Flaw {
     /// A time is given for a point that the world decides, or none for a point that the executor
     /// schedules.
     #[error(
-        "a time has to be given for exactly the points that the executor chooses, not so for point {0}"
+        "a time must be given for exactly the points that the executor chooses; point {0} \
+         violates this"
     )]
     NotChosen(usize),
     /// A point may come before time zero, or time zero is not at 0.
-    #[error("the times given for point {0} are not at 0 or later in all of the box")]
+    #[error("the times given for point {0} are negative for some values in the box")]
     BeforeTimeZero(usize),
     /// Times do not satisfy a constraint.
-    #[error("the given times do not satisfy constraint {0} in all of the box")]
+    #[error("the given times violate constraint {0} for some values in the box")]
     ConstraintViolated(usize),
     /// The schedules do not form a tree.
-    #[error("schedule {0} is reached never or twice, or splits an interval that has no end")]
+    #[error("schedule {0} is not reached exactly once, or splits an unbounded interval")]
     Schedules(usize),
     /// Negative edges and waits form a cycle.
     #[error("the predecessors of point {0} also come after it")]
     NegativeCycle(usize),
     /// The network is not closed: the edge or wait that two edges imply is missing.
-    #[error("the network is not closed: an edge is missing beside two that meet at point {0}")]
+    #[error("the network is not closed: the edge that two edges at point {0} imply is missing")]
     NotClosed(usize),
     /// A sum of inequalities is not a contradiction.
-    #[error("it does not follow that condition {0} holds in all of the box")]
+    #[error("it does not follow that condition {0} holds for all values in the box")]
     Condition(usize),
     /// The answer disagrees with its certificate.
     #[error("the answer and its certificate differ in {0}")]
     Differs(String),
     /// The answer does not match the problem and the plan.
-    #[error("the answer is not about these files: {0}")]
+    #[error("the answer does not belong to these files: {0}")]
     Files(String),
 }

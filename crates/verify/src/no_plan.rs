@@ -126,10 +126,10 @@ pub const MAX_STEPS: u64 = 20_000_000;
 #[non_exhaustive]
 pub enum NoPlanFlaw {
     /// The claim does not match the certificate.
-    #[error("`proves` is not what the certificate proves")]
+    #[error("`proves` differs from the statement that the certificate proves")]
     Claim,
     /// The problem has a feature that the checker does not support.
-    #[error("the checker does not know {0}")]
+    #[error("the checker does not support {0}")]
     Unknown(&'static str),
     /// The problem has no such fact.
     #[error("the problem has no fact `{0}`")]
@@ -138,7 +138,7 @@ pub enum NoPlanFlaw {
     #[error("`{0}` is listed twice")]
     Twice(String),
     /// A fact that is not listed, or is listed for later, can become true.
-    #[error("`{fact}` can be true at {time}, by {by}; the certificate says {said}")]
+    #[error("`{fact}` can be true at {time}, by {by}; the certificate states {said}")]
     Breach {
         /// The fact.
         fact: String,
@@ -150,7 +150,7 @@ pub enum NoPlanFlaw {
         said: String,
     },
     /// Two elements can be true together earlier than the certificate claims.
-    #[error("{pair} can be so earlier than the certificate says, by {by}")]
+    #[error("{pair} can be true together earlier than the certificate states, by {by}")]
     Together {
         /// The elements.
         pair: String,
@@ -158,10 +158,10 @@ pub enum NoPlanFlaw {
         by: String,
     },
     /// A happening leads to a state that is not listed.
-    #[error("something that can happen in {0} leads to a state that is not listed")]
+    #[error("a happening that is possible in {0} leads to a state that is not listed")]
     Leads(String),
     /// Two objects are not interchangeable.
-    #[error("`{0}` and `{1}` are not alike")]
+    #[error("`{0}` and `{1}` are not interchangeable")]
     NotInterchangeable(String, String),
     /// The list does not exclude the goal.
     #[error("according to the listed facts, the goal could be reached")]
@@ -176,10 +176,10 @@ pub enum NoPlanFlaw {
 #[non_exhaustive]
 pub enum NoPlanAnswerError {
     /// The text is not an answer of `elbowroom plan`.
-    #[error("this is no answer of `elbowroom plan --json`: {0}")]
+    #[error("this is not an answer of `elbowroom plan --json`: {0}")]
     Unreadable(#[from] serde_json::Error),
     /// The answer does not claim that there is no plan.
-    #[error("the answer does not say that no plan exists")]
+    #[error("the answer does not state that no plan exists")]
     NotDenied,
     /// The answer has no certificate.
     #[error("the answer has no certificate: {0}")]
@@ -217,7 +217,7 @@ pub fn certificate_of(answer: &str) -> Result<NoPlan, NoPlanAnswerError> {
         ("no plan", Some(certificate), _) => Ok(certificate),
         (_, _, Some(why)) => Err(NoPlanAnswerError::Uncertified(why)),
         ("no plan", None, None) => {
-            let why = "it does not say why".to_owned();
+            let why = "it gives no reason".to_owned();
             Err(NoPlanAnswerError::Uncertified(why))
         }
         _ => Err(NoPlanAnswerError::NotDenied),

@@ -450,8 +450,8 @@ impl Subject<'_> {
         Err(PipelineError::Refused(Refusal::Nature {
             place: place.to_owned(),
             obstacle: format!(
-                "the course of processes and events may change, and what the plan does then is \
-                 not analysed: {reason}"
+                "processes and events may occur in a different order, and that case is not \
+                 analysed: {reason}"
             ),
         }))
     }

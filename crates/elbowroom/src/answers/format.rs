@@ -15,7 +15,7 @@ impl From<Version> for u32 {
 
 /// The unsupported version of a document.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("version {0} of this document cannot be read, only 1")]
+#[error("unsupported version {0} of this document, expected version 1")]
 pub struct UnknownVersion(pub u32);
 
 impl TryFrom<u32> for Version {

@@ -212,7 +212,7 @@ fn finding(
     watcher: &mut dyn Observer,
 ) -> Result<OddsFinding, RequestError> {
     if let Some(feature) = request.task.validator_only_feature() {
-        let message = format!("odds do not respect {feature} yet, which the problem has");
+        let message = format!("the problem has {feature}, which `odds` does not support yet");
         return Err(RequestError::Unsupported(message));
     }
     let made;

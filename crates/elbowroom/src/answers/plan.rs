@@ -279,8 +279,8 @@ pub fn stopped_before_reading(planner: &str, halt: StopRequest, elapsed: Duratio
         StopRequest::Cancelled => "stopped",
     };
     let reason = format!(
-        "no plan found: {ended}, before domain and problem were read; this is no proof that there \
-         is none"
+        "no plan found: {ended}, before domain and problem were read; this does not prove that \
+         none exists"
     );
     PlanOutcome {
         answer: PlanAnswer {
@@ -451,5 +451,5 @@ fn no_plan_reason(
         ),
         _ => return exhausted(counts, without_self_overlap),
     };
-    format!("no plan found: {ended}; this is no proof that there is none")
+    format!("no plan found: {ended}; this does not prove that none exists")
 }

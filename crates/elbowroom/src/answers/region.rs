@@ -214,8 +214,8 @@ pub fn region(
             requirement: Some(requirement),
         }) => RegionFinding::None {
             reason: format!(
-                "\"{}\" multiplies quantities that are left open, so that the region has no flat \
-                 sides: leave less open (--vary)",
+                "\"{}\" multiplies open quantities, so the region is not polyhedral: vary fewer \
+                 quantities (--vary)",
                 form.obligations[*requirement]
                     .requirement
                     .describe(task, &plan.plan)

@@ -405,10 +405,10 @@ impl Subject {
                 let (task, plan) = self.repaired(&values, &schedule);
                 let why = match pipeline::validate_plan(&task, &plan) {
                     elbowroom_model::Verdict::Invalid(violation) => violation.to_string(),
-                    _ => "the judge does not accept the plan".to_owned(),
+                    _ => "the validator rejects the plan".to_owned(),
                 };
                 RepairFinding::Impossible {
-                    because: vec![format!("{why}; repairs do not respect this")],
+                    because: vec![format!("{why}; repair does not take this into account")],
                     orders,
                 }
             }

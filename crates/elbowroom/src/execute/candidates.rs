@@ -321,7 +321,7 @@ impl<'a> Candidates<'a> {
                 self.plans.push(plan.clone());
                 let made_for = match (own, place) {
                     (true, 0) => String::new(),
-                    (true, _) => "on the way to the shortest".to_owned(),
+                    (true, _) => "during the search for the shortest".to_owned(),
                     (false, _) => variant.describe(self.world),
                 };
                 self.ready.push_back(Candidate { plan, made_for });

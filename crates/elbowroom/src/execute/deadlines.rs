@@ -42,7 +42,7 @@ fn obstacle_of_fact(task: &Task, fact: ground::FactId) -> Option<String> {
     });
     let first = conditional.map(|schema| schema.name.as_str()).next()?;
     Some(format!(
-        "`{first}` changes `{name}` under a condition, so the goal cannot have a deadline"
+        "a conditional effect of `{first}` changes `{name}`, so the goal cannot have a deadline"
     ))
 }
 

@@ -32,7 +32,7 @@ pub fn read_goal(task: &Task, text: &str) -> Result<Condition, String> {
 fn first_error(mistakes: &Diagnostics) -> String {
     let mut errors = mistakes.errors();
     errors.next().map_or_else(
-        || "it is no condition".to_owned(),
+        || "expected a condition".to_owned(),
         |first| first.to_string().replace(": error:", ":"),
     )
 }

@@ -157,8 +157,8 @@ impl fmt::Display for Choice {
             ),
             (_, false) => write!(
                 f,
-                "chosen among {plans} plans: {value}{samples}, beside {shortest} of the shortest; \
-                 made {made_for}"
+                "chosen among {plans} plans: {value}{samples}, against {shortest} of the \
+                 shortest; made {made_for}"
             ),
         }
     }

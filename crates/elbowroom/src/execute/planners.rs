@@ -162,14 +162,14 @@ fn no_plan_reason(stopped: Stopped, counts: (Counts, bool), most_states: u64) ->
     match stopped {
         Stopped::Exhausted => exhausted(counts.0, counts.1),
         Stopped::OutOfMemory => format!(
-            "no plan was found within the planner's memory, among {} states",
+            "no plan was found within the planner's memory limit, after {} states",
             counts.0.evaluated
         ),
         _ if counts.0.evaluated < most_states => format!(
-            "no plan was found within the planning budget (`--planning-budget`), among {} states",
+            "no plan was found within the planning budget (`--planning-budget`), after {} states",
             counts.0.evaluated
         ),
-        _ => format!("no plan was found among {most_states} states (`--planner-states`)"),
+        _ => format!("no plan was found after {most_states} states (`--planner-states`)"),
     }
 }
 
@@ -182,8 +182,8 @@ pub(crate) fn exhausted(counts: Counts, without_self_overlap: bool) -> String {
         ""
     };
     format!(
-        "no plan found{without}: searched all that the search can reach, {evaluated} states; this is no \
-         proof that there is none"
+        "no plan found{without}: search space exhausted after {evaluated} states; this does not \
+         prove that none exists"
     )
 }
 
@@ -212,7 +212,8 @@ fn refuted_answer(
             };
             PlanAnswer::NotFound {
                 why: format!(
-                    "{none}: the search ended without one. There is no certificate that none exists: {why}"
+                    "{none}: search space exhausted. There is no certificate that none exists: \
+                     {why}"
                 ),
             }
         }

@@ -257,7 +257,7 @@ impl Planner for BudgetedPlanner<'_> {
         self.embedded.work = self.budget.remaining();
         if self.remaining_states == 0 || self.budget.is_spent() {
             return PlannerAnswer::from(PlanAnswer::NotFound {
-                why: "the limit on what trying plans out may take is reached".to_owned(),
+                why: "the limit on rollouts is reached".to_owned(),
             });
         }
         let (answer, states) = self.embedded.plan_with_state_count(task, situation);

@@ -61,15 +61,19 @@ const fn change(
 
 /// All methods of the interface.
 pub const METHODS: &[Method] = &[
-    get("/v1/state", "How things stand", Answer::Json(State::schema)),
+    get(
+        "/v1/state",
+        "Status of the executive",
+        Answer::Json(State::schema),
+    ),
     get(
         "/v1/goals",
-        "The goals: those that are open, and the last ones that were closed",
+        "The open goals, and the goals that were closed most recently",
         Answer::Json(GoalsNow::schema),
     ),
     get(
         "/v1/goals/{name}",
-        "The open goal of that name, or otherwise the last one that was closed",
+        "The open goal with that name, or otherwise the one that was closed last",
         Answer::Json(GoalNow::schema),
     ),
     get(
@@ -89,11 +93,11 @@ pub const METHODS: &[Method] = &[
     ),
     get(
         "/v1/events",
-        "Every line of the trace from now on, as server-sent events; with `?after=N`, or the header \
-         Last-Event-ID, those behind line N",
+        "Every line of the trace from now on, as server-sent events; with `?after=N`, or the \
+         header Last-Event-ID, the lines after N",
         Answer::Other(
             "text/event-stream",
-            "Events named `entry`; `over` when there are no more",
+            "Events named `entry`; `over` after the last one",
         ),
     ),
     get(
@@ -134,42 +138,32 @@ pub const METHODS: &[Method] = &[
         "A problem, for an executive that was started without one",
         Some(NewProblem::schema),
     ),
-    change(
-        "POST",
-        "/v1/goals",
-        "Another goal, which is to be reached, too",
-        Some(NewGoal::schema),
-    ),
-    change("DELETE", "/v1/goals/{name}", "That goal is abandoned", None),
+    change("POST", "/v1/goals", "Adds a goal", Some(NewGoal::schema)),
+    change("DELETE", "/v1/goals/{name}", "Abandons the goal", None),
     change(
         "POST",
         "/v1/actions",
-        "A running action is done or has failed, or is to be cancelled",
+        "Reports that a running action has ended or failed, or cancels it",
         Some(NewOutcome::schema),
     ),
-    change(
-        "POST",
-        "/v1/facts",
-        "A fact is so from now on",
-        Some(NewFact::schema),
-    ),
+    change("POST", "/v1/facts", "Sets a fact", Some(NewFact::schema)),
     change(
         "POST",
         "/v1/numbers",
-        "A number is so from now on",
+        "Sets a number",
         Some(NewNumber::schema),
     ),
     change(
         "POST",
         "/v1/pause",
-        "Nothing more is started; running actions continue",
+        "Stops dispatching; running actions continue",
         None,
     ),
-    change("POST", "/v1/resume", "The end of a pause", None),
+    change("POST", "/v1/resume", "Ends a pause", None),
     change(
         "POST",
         "/v1/stop",
-        "The executive ends: running actions are cancelled",
+        "Shuts down the executive; running actions are cancelled",
         None,
     ),
 ];
@@ -204,7 +198,7 @@ pub fn openapi() -> Value {
         });
         if method.changes() {
             operation["responses"]["202"] = json!({
-                "description": "It has come in, but is not taken in yet: a plan is being made",
+                "description": "Received, but not processed yet, because planning is in progress",
                 "content": content,
             });
             operation["security"] = json!([{ "token": [] }]);

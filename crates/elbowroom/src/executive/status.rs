@@ -254,7 +254,7 @@ fn in_doubt(belief: &BeliefState) -> Vec<InDoubt> {
     let of = |name: &str, doubts: &[Doubt], settles: &str| {
         let one = |doubt: &Doubt| InDoubt {
             why: format!(
-                "it is unknown whether {} has come to its end; `ctl {}` settles it",
+                "it is unknown whether {} has ended; set the value with `ctl {}`",
                 doubt.action,
                 settles.replace("NAME", &format!("'{name}'"))
             ),

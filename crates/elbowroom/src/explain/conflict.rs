@@ -244,7 +244,7 @@ impl Explainer<'_> {
             let is_apart = constraints(Side::Lower).any(keeps_apart);
             return Some(if is_apart {
                 format!(
-                    "steps that must be apart have to fit into {}",
+                    "steps with a least separation must fit into {}",
                     actions.join(" and ")
                 )
             } else {
@@ -264,8 +264,8 @@ enum UpperBound {
     Limit(String),
 }
 
-/// Forms the sentence: `A, B must fit into C`, or `deadline of D at 60, because A, B must be over
-/// before it`.
+/// Forms the sentence: `A, B must fit into C`, or `deadline of D at 60, because A, B must end before
+/// it`.
 fn sentence(needs: &[String], rooms: &[UpperBound]) -> String {
     let needs = needs.join(", ");
     let mut actions = Vec::new();
@@ -286,7 +286,7 @@ fn sentence(needs: &[String], rooms: &[UpperBound]) -> String {
         (false, true, true) => {
             format!("an over-all condition holds only if {needs} ends as soon as it starts")
         }
-        (false, true, false) => format!("{limits}, because {needs} must be over before it"),
+        (false, true, false) => format!("{limits}, because {needs} must end before it"),
         (false, false, true) => format!("{needs} must fit into {actions}"),
         (false, false, false) => format!("{limits}, and {needs} must fit into {actions}"),
     }

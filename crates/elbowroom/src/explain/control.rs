@@ -33,8 +33,11 @@ impl Explainer<'_> {
             .map(|id| self.describe_duration(id))
             .collect();
         let mut reason = match unknown.as_slice() {
-            [] => "no executor can see to this beforehand".to_owned(),
-            _ => format!("one would have to know in advance {}", join_list(&unknown)),
+            [] => "no executor can guarantee this in advance".to_owned(),
+            _ => format!(
+                "the executor would have to know in advance {}",
+                join_list(&unknown)
+            ),
         };
         if !between.is_empty() {
             reason.push_str(": ");

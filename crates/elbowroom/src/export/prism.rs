@@ -44,34 +44,34 @@ pub enum PrismError {
     NotTabulated(#[from] NotTabulated),
     /// The world has facts that change at a rate, and thus repeatedly.
     #[error(
-        "the world has facts that change by themselves at a rate ([[hazard]]), and only events that \
-         happen at most once are written as a process; `elbowroom compare` with `optimum = true` \
-         knows rates"
+        "the world has facts that change by themselves at a rate ([[hazard]]), but the export \
+         supports only events that happen at most once; `elbowroom compare` with `optimum = true` \
+         supports rates"
     )]
     Rates,
     /// The problem has changing numbers in conditions.
     #[error(
-        "the problem has numbers that change and that matter, and only facts are written as a process; \
-         `elbowroom compare` with `optimum = true` knows numbers"
+        "the problem has relevant numbers that change, but the export supports only facts; \
+         `elbowroom compare` with `optimum = true` supports numbers"
     )]
     Numbers,
     /// Failures have several outcomes, or take time.
     #[error(
-        "the world has failures with several outcomes or with delays ([[failure.outcome]]), and only \
-         failures that all leave the same behind are written as a process; `elbowroom compare` with \
-         `optimum = true` knows outcomes"
+        "the world has failures with several outcomes or with delays ([[failure.outcome]]), but \
+         the export supports only failures with the same effects; `elbowroom compare` with \
+         `optimum = true` supports outcomes"
     )]
     Outcomes,
     /// Likelihoods are rates per second.
     #[error(
-        "the likelihoods have rates per second, and the process without time has steps only: give \
+        "the likelihoods have rates per second, but the process without time has only steps: give \
          `becomes_true` and `becomes_false` instead, and `end` instead of `during_per_second`"
     )]
     Seconds,
     /// The process has too many commands.
     #[error(
-        "the process has {commands} commands, and {most} is the most that is written: say fewer \
-         --cells, or take a problem with fewer actions",
+        "the process has {commands} commands, more than the limit of {most}: give fewer --cells, \
+         or a problem with fewer actions",
         most = MOST_COMMANDS
     )]
     TooLarge {
@@ -79,13 +79,13 @@ pub enum PrismError {
         commands: usize,
     },
     /// The number of cells is out of range.
-    #[error("there can be 1 to 65533 cells, not {cells}")]
+    #[error("expected 1 to 65533 cells, found {cells}")]
     Cells {
         /// The requested number.
         cells: usize,
     },
     /// A run has a limited number of steps.
-    #[error("a process is written for runs of any length only: leave the horizon unlimited")]
+    #[error("the export does not support a horizon: remove it")]
     Horizon,
 }
 

@@ -49,14 +49,14 @@ impl<'a> Text<'a> {
                  schedule, and every schedule is valid (the weak guarantee)."
             }
             Guarantee::Strong => {
-                "Both answers are unsat exactly if one schedule does for all values in the box\n\
-                 below, and every schedule is valid (the strong guarantee)."
+                "Both answers are unsat exactly if one schedule satisfies the bounds for all values\n\
+                 in the box below, and every schedule is valid (the strong guarantee)."
             }
             _ => {
                 "The answer is unsat exactly if every schedule is valid, for all values in the box\n\
-                 below. That is one half of the dynamic guarantee. The other half, that whoever\n\
-                 learns values only as they come about can keep to a schedule, is a game, and not\n\
-                 in this text: a checker of dynamic controllability answers it for the network of\n\
+                 below. That is one half of the dynamic guarantee. The other half, that an executor\n\
+                 which observes values only at run time can follow a schedule, is a game and cannot be\n\
+                 expressed here: a checker of dynamic controllability decides it for the network of\n\
                  `elbowroom export stnu`."
             }
         };
@@ -130,8 +130,8 @@ impl<'a> Text<'a> {
     pub(super) fn fixed_times(&self, network: &UncertainNetwork<Rational>, text: &mut String) {
         part(
             text,
-            "For whatever times the executor chooses, is there something that the world can decide\n\
-             so that a bound is broken? unsat: no, some times are right whatever the world does.",
+            "Can the world violate a bound for every schedule that the executor chooses?\n\
+             unsat: no, some schedule satisfies the bounds for all choices of the world.",
         );
         text.push_str("(set-logic LRA)\n");
         let links = network.links();
@@ -178,15 +178,15 @@ impl<'a> Text<'a> {
             &mut text,
             "The values of its parameters for which it has a schedule and every schedule is valid,\n\
              as far as happenings keep the order that they have at the nominal values: the region\n\
-             of the weak guarantee. The answer is sat if there are such values. Assert more about\n\
-             the parameters to ask about some of them: with all of them fixed, sat says that the\n\
-             plan works with these.",
+             of the weak guarantee. The answer is sat if there are such values. Add assertions\n\
+             about the parameters to restrict them: with all of them fixed, sat means that the plan\n\
+             works with these values.",
         );
         comment(&mut text, "");
         for (index, parameter) in self.plan.parameters.iter().enumerate() {
             let (name, words) = (&self.symbols.parameters[index], self.words(index));
             let nominal = &parameter.nominal;
-            comment(&mut text, &format!("{name}: {words}, as planned {nominal}"));
+            comment(&mut text, &format!("{name}: {words}, nominal {nominal}"));
         }
         let logic = if self.has_products() { "NRA" } else { "LRA" };
         let _ = writeln!(text, "(set-logic {logic})");

@@ -41,10 +41,10 @@ pub enum Durations {
 /// A link has no upper bound, so its durations cannot be drawn uniformly.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "the link from `{activation}` to `{end}` has no upper bound, so no duration can be drawn \
-     evenly; {}",
+    "the link from `{activation}` to `{end}` has no upper bound, so its durations cannot be drawn \
+     uniformly; {}",
     if *is_given {
-        "draw durations as the file says"
+        "draw them from the distributions of the file"
     } else {
         "give it an upper bound or a distribution"
     }

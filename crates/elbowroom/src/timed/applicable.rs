@@ -101,7 +101,7 @@ fn grounded(
         reachability::ground(&wider, &reachability::Settings::default())
     else {
         return Err(NotTabulated::new(
-            "there are more actions than can be listed",
+            "there are too many instances of actions to list them",
         ));
     };
     if !grounding.rules.is_empty() {

@@ -117,7 +117,7 @@ impl<'t> Compiler<'t> {
             let value = task.initial().values.get(fluent);
             let initial = value.and_then(units).ok_or_else(|| {
                 NotTabulated::new(format!(
-                    "{} changes, and has no value to begin with, or one of more than six decimals",
+                    "{} changes, and its initial value is missing or has more than six decimals",
                     task.fluent_name(*fluent)
                 ))
             })?;
@@ -133,7 +133,7 @@ impl<'t> Compiler<'t> {
         };
         if compiler.facts.len() > 128 {
             return Err(NotTabulated::new(format!(
-                "{} facts matter, and 128 is the most",
+                "{} facts are relevant, more than the limit of 128",
                 compiler.facts.len()
             )));
         }
@@ -192,8 +192,8 @@ impl<'t> Compiler<'t> {
             (_, Some(bound), Some(number), _) => (number, flipped(comparison), bound),
             _ => {
                 return Err(NotTabulated::new(
-                    "a condition compares something else than a number that changes with one that \
-                         does not, or reads a number that has no value",
+                    "a condition is not a comparison of a changing number with a constant, or \
+                     reads a number without a value",
                 ));
             }
         };
@@ -243,7 +243,7 @@ impl<'t> Compiler<'t> {
             }
         };
         let Some(planned) = self.value(value) else {
-            return refuse("an amount that depends on what changes, or on a duration");
+            return refuse("an amount that depends on changing numbers or on a duration");
         };
         let by = match self.model.amount(name, &self.task.fluent_name(fluent)) {
             Some(rule) => ChangeValue::Random {
@@ -256,7 +256,7 @@ impl<'t> Compiler<'t> {
             && rule.is_relative
             && *planned <= 0.0
         {
-            return refuse("an amount that is drawn in proportion to none");
+            return refuse("a random amount in proportion to a planned amount of 0 or less");
         }
         Ok(Some(Amount { number, change, by }))
     }
@@ -291,7 +291,7 @@ impl<'t> Compiler<'t> {
         changed.sort_unstable();
         changed.dedup();
         if changed.len() < amounts.len() {
-            return refuse("several effects on one number at once");
+            return refuse("several simultaneous effects on one number");
         }
         Ok(Snap {
             needs: self.needs(&snap.condition)?,
@@ -341,14 +341,14 @@ impl<'t> Compiler<'t> {
             Body::Instantaneous(snap) => (self.snap(snap, name)?, None, Rational::ZERO),
             Body::Durative(body) => {
                 let Some(planned) = self.duration(body) else {
-                    return refuse("a duration that is to be chosen");
+                    return refuse("a duration that the plan chooses");
                 };
                 let rest = (self.needs(&body.over_all)?, self.snap(&body.end, name)?);
                 (self.snap(&body.start, name)?, Some(rest), planned)
             }
         };
         if start.amounts.iter().any(Amount::is_drawn) {
-            return refuse("an amount that is drawn at its start");
+            return refuse("a random amount at its start");
         }
         let failures = self.failures(name, model, &start, rest.is_some())?;
         let (mut midway, mut at_end) = (0.0, 0.0);
@@ -409,8 +409,8 @@ impl<'t> Compiler<'t> {
         for timed in self.task.timed() {
             if Footprint::of_timed(timed).writes_reads_of(&goal) {
                 return Err(NotTabulated::new(
-                    "a timed initial changes what the goal reads, so that the goal is not reached \
-                     as soon as it holds",
+                    "a timed initial changes a fact of the goal, so the goal is not yet reached \
+                     when it holds",
                 ));
             }
             let (mut adds, mut deletes) = (0, 0);
@@ -471,5 +471,5 @@ fn flipped(comparison: Comparison) -> Comparison {
 }
 
 fn too_fine() -> NotTabulated {
-    NotTabulated::new("there is a number of more than six decimals")
+    NotTabulated::new("a number has more than six decimals")
 }

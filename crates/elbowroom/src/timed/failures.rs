@@ -104,7 +104,7 @@ impl Compiler<'_> {
         }
         if ways.len() > MOST_WAYS {
             return refuse(&format!(
-                "{} different outcomes of its failures, and {MOST_WAYS} is the most",
+                "{} different outcomes of its failures, more than the limit of {MOST_WAYS}",
                 ways.len()
             ));
         }

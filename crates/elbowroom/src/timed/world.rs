@@ -55,9 +55,7 @@ impl TimedWorld {
         settings: &Settings,
     ) -> Result<Self, NotTabulated> {
         if let Some(feature) = task.validator_only_feature() {
-            return Err(NotTabulated::new(format!(
-                "it does not support {feature}, which the problem has"
-            )));
+            return Err(NotTabulated::new(format!("the problem has {feature}")));
         }
         if !model.reports.is_perfect() {
             return Err(NotTabulated::new("the world's reports are not perfect"));
@@ -69,7 +67,7 @@ impl TimedWorld {
         }
         if model.hazards.iter().any(|hazard| !hazard.is_reported) {
             return Err(NotTabulated::new(
-                "the world has facts that change at a rate and does not report it",
+                "the world has facts that change at a rate without being reported",
             ));
         }
         let actions = actions(task, model, settings)?;
@@ -78,7 +76,7 @@ impl TimedWorld {
         let events = compiler.events(model)?;
         if events.len() > MOST_EVENTS {
             return Err(NotTabulated::new(format!(
-                "{} events matter, and {MOST_EVENTS} is the most",
+                "{} events are relevant, more than the limit of {MOST_EVENTS}",
                 events.len()
             )));
         }
@@ -88,7 +86,7 @@ impl TimedWorld {
         }
         if acts.len() > MOST_ACTS {
             return Err(NotTabulated::new(format!(
-                "{} actions matter, and {MOST_ACTS} is the most",
+                "{} actions are relevant, more than the limit of {MOST_ACTS}",
                 acts.len()
             )));
         }
@@ -99,7 +97,7 @@ impl TimedWorld {
         let known = compiler.facts.len() + tests.len();
         if known > MOST_FACTS {
             return Err(NotTabulated::new(format!(
-                "{known} facts and comparisons matter, and {MOST_FACTS} is the most"
+                "{known} facts and comparisons are relevant, more than the limit of {MOST_FACTS}"
             )));
         }
         let mut world = Self {
@@ -307,7 +305,7 @@ fn latest(events: &[Event], model: &WorldModel) -> Result<f64, NotTabulated> {
             time *= 2.0;
             if time > 1e9 {
                 return Err(NotTabulated::new(
-                    "there is an event that may take more than 10^9 seconds to come",
+                    "an event may happen later than 10^9 seconds",
                 ));
             }
         }
@@ -351,7 +349,7 @@ impl TimedWorld {
         }
         if self.horizon <= 0.0 {
             return Err(NotTabulated::new(
-                "nothing happens by itself, so there is nothing to be late for",
+                "there are no events, so no time limit can be derived",
             ));
         }
         Ok(self.horizon)

@@ -78,7 +78,7 @@ pub(super) fn avoiding_alternatives(
 fn several_parts(plan: &StnPlan, over_all: &OverAll) -> Refusal {
     Refusal::TooManyCases {
         place: format!(
-            "a condition throughout {} that can fail in several ways at once",
+            "an over-all condition of {} that can fail in several ways at the same time",
             plan.instance(over_all.instance).action.name
         ),
         limit: 1,

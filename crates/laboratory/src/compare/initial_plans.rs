@@ -120,10 +120,10 @@ mod tests {
     #[test]
     fn note_states_length_and_probability_of_plan() {
         let (rows, columns) = (["live".to_owned()], ["20.5".to_owned()]);
-        let slow = example(0, 0, "of actions that seldom fail");
+        let slow = example(0, 0, "of actions that rarely fail");
         assert_eq!(
             notes(&[slow], &rows, &columns).join("\n"),
-            "`live` in 20.5 begins with a plan made of actions that seldom fail: 4 actions, \
+            "`live` in 20.5 begins with a plan made of actions that rarely fail: 4 actions, \
              ends at 18.000, works in 90 % of the samples"
         );
         let many = [example(0, 0, ""), example(1, 0, "for the worst")];

@@ -117,7 +117,7 @@ impl ConstraintMonitor {
             Modal::AtEnd(c) => match self.0.last() {
                 Some(last) if !last.holds[0] => Finding::Violated(
                     PhaseStart::at(end),
-                    format!("{} does not hold in the end", text(c)),
+                    format!("{} does not hold at the end", text(c)),
                     last.reasons.clone(),
                 ),
                 _ => Finding::Satisfied,
@@ -146,7 +146,11 @@ impl ConstraintMonitor {
                 if self.0[position..].iter().any(|phase| phase.holds[1]) {
                     return Finding::Satisfied;
                 }
-                let why = format!("{} holds, and {} does not then or later", text(c), text(d));
+                let why = format!(
+                    "{} holds, but {} does not hold then or later",
+                    text(c),
+                    text(d)
+                );
                 broken(&self.0[position], why)
             }
             Modal::SometimeBefore(c, d) => {
@@ -159,13 +163,13 @@ impl ConstraintMonitor {
                 if is_before || self.0[..position].iter().any(|phase| phase.holds[1]) {
                     return Finding::Satisfied;
                 }
-                let why = format!("{} holds, and {} never did before", text(c), text(d));
+                let why = format!("{} holds, but {} never held before", text(c), text(d));
                 broken(phase, why)
             }
             Modal::AlwaysWithin(time, c, d) => {
                 let why = || {
                     let (c, d, time) = (text(c), text(d), decimal(time));
-                    format!("{c} holds, and {d} does not within {time}")
+                    format!("{c} holds, but {d} does not hold within {time}")
                 };
                 self.always_within(time, &why)
             }

@@ -96,7 +96,7 @@ impl fmt::Display for ViolationKind {
                 now,
             } => write!(
                 f,
-                "has the duration {}, where {possible} was possible and it is {} already",
+                "has the duration {}, but only {possible} was possible at time {}",
                 decimal(duration),
                 decimal(now)
             ),
@@ -169,14 +169,16 @@ impl fmt::Display for ViolationKind {
                 }
             }
             Self::EndlessEvent { event, is_alone } => {
-                write!(f, "the event {event} happens without end: ")?;
+                write!(f, "the event {event} happens infinitely often: ")?;
                 f.write_str(if *is_alone {
                     "its effects do not make its precondition false"
                 } else {
-                    "other events make its precondition true again at once"
+                    "other events make its precondition true again at the same time"
                 })
             }
-            Self::Conflict { fluent } => write!(f, "gives {fluent} several values at once"),
+            Self::Conflict { fluent } => {
+                write!(f, "gives {fluent} several values at the same time")
+            }
             Self::Undefined { fluent, within } => {
                 write!(f, "reads {fluent}, which has no value, in {within}")
             }
@@ -257,13 +259,13 @@ impl fmt::Display for UndecidedReason {
             Self::Open { unknown, within } => {
                 write!(
                     f,
-                    "{unknown} is left open and read by {within}: give it a value"
+                    "{within} reads the open number {unknown}: give it a value"
                 )
             }
             Self::Nonlinear { fluent } => write!(
                 f,
                 "nonlinear change: the rate of {fluent} depends on {fluent} itself, so its value \
-                 is no polynomial in time"
+                 is not a polynomial in time"
             ),
             Self::Quotient { divisor, within } => {
                 write!(
@@ -272,35 +274,32 @@ impl fmt::Display for UndecidedReason {
                 )
             }
             Self::Misplaced { expression, within } => {
-                write!(f, "{expression} means nothing in {within}")
+                write!(f, "{expression} is undefined in {within}")
             }
             Self::ContinuousGuard { fluent } => write!(
                 f,
-                "a continuous effect on {fluent} depends on an over-all condition, whose truth \
-                 lies in the future"
+                "a continuous effect on {fluent} depends on an over-all condition, whose truth is \
+                 not known before the end"
             ),
-            Self::PastStates => write!(
-                f,
-                "a constraint on the course of the whole plan depends on the states before"
-            ),
+            Self::PastStates => write!(f, "a trajectory constraint depends on the states before"),
             Self::CloseTimes { constraint } => write!(
                 f,
-                "whether {constraint} is kept depends on two times less than a millionth apart"
+                "{constraint} depends on two times less than a millionth apart"
             ),
             Self::Irrational { fluent, within } => write!(
                 f,
-                "{within} reads {fluent}, whose value is irrational: its change stopped, or went \
-                 on differently, at an irrational moment"
+                "{within} reads {fluent}, whose value is irrational: its rate of change changed \
+                 at an irrational time"
             ),
             Self::Chattering { process } => write!(
                 f,
-                "the process {process} would start and stop without end: at work it makes its \
-                 condition false, and without it the condition is true"
+                "the process {process} would start and stop infinitely often: it makes its \
+                 condition false while active, and the condition is true while it is inactive"
             ),
             Self::ManyChanges { most } => write!(
                 f,
-                "events happen, or processes start and stop, more than {most} times before \
-                 anything of the plan does"
+                "events happen, or processes start and stop, more than {most} times before the \
+                 next happening of the plan"
             ),
             Self::Unstratified => write!(f, "a derived fact depends on its own negation"),
         }

@@ -35,7 +35,7 @@ pub(super) fn read(text: &str, report: &mut Report) -> Option<NetworkFile> {
             // Names must be unique, so repeated labels are dropped.
             if !labels.insert(name) || is_number(name) {
                 report.remark(format!(
-                    "the label `{name}` occurs twice or is a number; it is left out"
+                    "the label `{name}` occurs twice or is a number; it is ignored"
                 ));
             } else {
                 name.clone_into(&mut names[place - 1]);
@@ -46,7 +46,7 @@ pub(super) fn read(text: &str, report: &mut Report) -> Option<NetworkFile> {
             report.mistake(
                 at,
                 format!("there is no node {number}"),
-                "nodes count from 1 to what the line `p sp NODES ARCS` says",
+                "nodes are numbered from 1 to NODES of the line `p sp NODES ARCS`",
             );
         }
     }
@@ -63,7 +63,7 @@ pub(super) fn read(text: &str, report: &mut Report) -> Option<NetworkFile> {
             [] | ["c" | "p", ..] => {}
             _ => report.mistake(
                 at,
-                "this is neither an arc nor a comment",
+                "this line is neither an arc nor a comment",
                 "arcs are `a U V W`, comments begin with `c`",
             ),
         }
@@ -96,7 +96,7 @@ fn node_count(text: &str, report: &mut Report) -> Option<usize> {
             if count.is_none() {
                 report.mistake(
                     at,
-                    "this line does not say how many nodes there are",
+                    "the number of nodes is missing",
                     "write `p sp NODES ARCS`",
                 );
             }
@@ -125,7 +125,7 @@ fn arc(
             report.mistake(
                 at,
                 format!("there is no node {number}"),
-                "nodes count from 1 to what the line `p sp NODES ARCS` says",
+                "nodes are numbered from 1 to NODES of the line `p sp NODES ARCS`",
             );
         }
         node
@@ -140,7 +140,7 @@ fn arc(
         }
         None => report.mistake(
             at,
-            format!("`{most}` is no number"),
+            format!("`{most}` is not a number"),
             "write a decimal or `inf`",
         ),
     }

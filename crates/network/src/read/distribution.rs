@@ -72,7 +72,7 @@ enum Kind {
 
 impl NamedDistribution {
     fn parse(name: &str) -> Result<Self, String> {
-        let wrong = || format!("the distribution `{name}` is not known");
+        let wrong = || format!("unknown distribution `{name}`");
         let (letter, rest) = name.split_once('_').ok_or_else(wrong)?;
         // Gamma distributions have their second and third number in parentheses.
         let rest = rest.replace(['(', ')', ' '], "").replace(',', "_");
@@ -131,9 +131,7 @@ impl NamedDistribution {
             }
             _ => return Ok(self),
         };
-        Err(format!(
-            "the distribution `{name}` makes no sense: {problem}"
-        ))
+        Err(format!("invalid distribution `{name}`: {problem}"))
     }
 
     /// Returns the distribution with its times multiplied by `unit`.

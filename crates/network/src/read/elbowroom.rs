@@ -19,8 +19,8 @@ pub(super) fn read(document: &Json<'_>, report: &mut Report) -> Option<NetworkFi
     if number(version, report)? != Rational::ONE {
         report.mistake(
             version.at,
-            "this version of the format is not known",
-            "version 1 is read",
+            "unsupported version of the format",
+            "expected version 1",
         );
         return None;
     }
@@ -31,7 +31,7 @@ pub(super) fn read(document: &Json<'_>, report: &mut Report) -> Option<NetworkFi
     for point in list(document, "points", report) {
         match point.text() {
             Some(name) => builder.point(name, point.at, report),
-            None => report.mistake(point.at, "this is no name", "write a text"),
+            None => report.mistake(point.at, "this is not a name", "write a string"),
         }
     }
     if let Some(reference) = document.member("reference").filter(|json| !is_null(json)) {
@@ -72,7 +72,11 @@ fn is_null(json: &Json<'_>) -> bool {
 
 fn node(builder: &Builder, json: &Json<'_>, report: &mut Report) -> Option<NodeId> {
     let Some(name) = json.text() else {
-        report.mistake(json.at, "this is no name of a time point", "write a text");
+        report.mistake(
+            json.at,
+            "this is not a name of a time point",
+            "write a string",
+        );
         return None;
     };
     builder.named(name, json.at, report)
@@ -126,7 +130,7 @@ fn read_duration(json: &Json<'_>, report: &mut Report) -> Option<Duration> {
     let Some([(kind, numbers)]) = json.members() else {
         report.mistake(
             json.at,
-            "this says not how a duration is distributed",
+            "this is not a distribution",
             "write `{ \"normal\": { \"mean\": …, \"deviation\": … } }`",
         );
         return None;
@@ -156,8 +160,8 @@ fn read_duration(json: &Json<'_>, report: &mut Report) -> Option<Duration> {
         _ => {
             report.mistake(
                 json.at,
-                format!("the distribution `{kind}` is not known"),
-                "known are normal, uniform, exponential and gamma",
+                format!("unknown distribution `{kind}`"),
+                "expected normal, uniform, exponential or gamma",
             );
             return None;
         }
@@ -171,8 +175,9 @@ fn read_duration(json: &Json<'_>, report: &mut Report) -> Option<Duration> {
     if !is_sound {
         report.mistake(
             json.at,
-            "the numbers of this distribution make no sense",
-            "deviations and means are not negative, shapes and scales positive, and from <= to",
+            "the numbers of this distribution are invalid",
+            "deviations and means must not be negative, shapes and scales must be positive, and \
+             from <= to",
         );
         return None;
     }
@@ -186,7 +191,7 @@ fn read_wait(builder: &mut Builder, json: &Json<'_>, report: &mut Report) {
     let Some(link) = builder.link_ending_at(end) else {
         report.mistake(
             json.at,
-            "this wait is for no end of a contingent link",
+            "this wait does not refer to the end of a contingent link",
             "name the end of a link under `until`",
         );
         return;
@@ -217,8 +222,8 @@ fn read_correlation(builder: &mut Builder, json: &Json<'_>, report: &mut Report)
         let Some(link) = link.filter(is_normal) else {
             report.mistake(
                 end.at,
-                "no link with a normal duration ends here, or it was named before",
-                "name the ends of links with normal durations",
+                "no link with a normal duration ends here, or it is listed twice",
+                "list the ends of links with normal durations, each once",
             );
             return;
         };

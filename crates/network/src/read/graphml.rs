@@ -70,8 +70,8 @@ fn graph<'e>(elements: &'e [Element], report: &mut Report) -> Option<&'e Element
                 ),
                 None => report.mistake(
                     0,
-                    "this XML has no graph",
-                    "GraphML has `<graphml …><graph …>` around its nodes and edges",
+                    "this XML contains no graph",
+                    "expected `<graphml …><graph …>` around the nodes and edges",
                 ),
             }
             None
@@ -80,7 +80,7 @@ fn graph<'e>(elements: &'e [Element], report: &mut Report) -> Option<&'e Element
             report.mistake(
                 second.at,
                 "there are several graphs",
-                "put each into a file of its own",
+                "put each into a separate file",
             );
             None
         }
@@ -168,7 +168,7 @@ impl Edge {
         if let Some(data) = data(element, "Value") {
             value = Bound::parse(&data.text);
             if value.is_none() {
-                report.mistake(data.text_at, "this value is no number", "write a number");
+                report.mistake(data.text_at, "this value is not a number", "write a number");
                 return None;
             }
         }
@@ -221,7 +221,7 @@ fn labelled(
     let Some((case, name, value)) = parts else {
         report.mistake(
             data.text_at,
-            format!("`{text}` is no labelled value"),
+            format!("`{text}` is not a labelled value"),
             "write `LC(C):4` or `UC(C):-7`, where C is the end of a contingent link",
         );
         return None;
@@ -239,7 +239,7 @@ fn contingent_links(builder: &mut Builder, edges: &[Edge], report: &mut Report) 
             report.mistake(
                 edge.at,
                 "there are two contingent edges from and to the same nodes",
-                "a contingent link is one edge there and one back",
+                "a contingent link consists of one edge in each direction",
             );
         }
     }
@@ -248,7 +248,7 @@ fn contingent_links(builder: &mut Builder, edges: &[Edge], report: &mut Report) 
             report.mistake(
                 edge.at,
                 "this contingent edge has no counterpart",
-                "a contingent link is one edge there and one back",
+                "a contingent link consists of one edge in each direction",
             );
             continue;
         };
@@ -258,8 +258,8 @@ fn contingent_links(builder: &mut Builder, edges: &[Edge], report: &mut Report) 
         } else if !leads_to_end(back, edge) && edge.from < edge.to {
             report.mistake(
                 edge.at,
-                "this contingent edge and its counterpart do not say which node is the end",
-                "the value of the edge from the end back to the beginning is negative or 0",
+                "this contingent edge and its counterpart do not define which node is the end",
+                "the value of the edge from the end to the beginning must be negative or 0",
             );
         }
     }
@@ -293,7 +293,7 @@ fn link(builder: &mut Builder, there: &Edge, back: &Edge, report: &mut Report) {
     let (Some(lower), Some(upper)) = (lower, upper) else {
         report.mistake(
             there.at,
-            "this contingent edge and its counterpart do not say both bounds",
+            "this contingent edge and its counterpart do not define both bounds",
             "write the values of both, or `LC(C):` with the lower bound and `UC(C):` with the \
              upper one negated",
         );
@@ -319,7 +319,7 @@ fn requirement(builder: &mut Builder, edge: &Edge, report: &mut Report) {
     match &edge.labelled {
         None => {
             if edge.value.is_none() {
-                report.remark("edges without a value say nothing; they are left out");
+                report.remark("edges without a value are ignored");
             }
         }
         Some((Case::Upper, end, value)) => {
@@ -335,14 +335,14 @@ fn requirement(builder: &mut Builder, edge: &Edge, report: &mut Report) {
                 None if report.is_failed() => {}
                 None => report.mistake(
                     edge.at,
-                    "this wait is for no contingent link that begins at the edge's target",
+                    "no contingent link for this wait begins at the edge's target",
                     "`UC(C):-7` on an edge to A needs a contingent link from A to C",
                 ),
             }
         }
         Some((Case::Lower, _, _)) => report.mistake(
             edge.at,
-            "a lower-case value stands on an edge that is not contingent",
+            "lower-case value on an edge that is not contingent",
             "write `contingent` as its type, or a plain value",
         ),
     }

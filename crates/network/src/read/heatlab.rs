@@ -79,8 +79,8 @@ fn read_constraint(builder: &mut Builder, constraint: &Json<'_>, report: &mut Re
             _ => {
                 report.mistake(
                     kind.at,
-                    "this type of constraint is not known",
-                    "known are \"stc\", \"stcu\" and \"pstc\"",
+                    "unknown type of constraint",
+                    "expected \"stc\", \"stcu\" or \"pstc\"",
                 );
                 return;
             }
@@ -128,7 +128,7 @@ fn named_distribution(
             report.mistake(
                 name.at,
                 message,
-                "known are N_mean_deviation, U_from_to, E_rate_from and G_shape_(rate,from)",
+                "expected N_mean_deviation, U_from_to, E_rate_from or G_shape_(rate,from)",
             );
             None
         }

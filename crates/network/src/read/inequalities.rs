@@ -38,7 +38,7 @@ pub(super) fn read(document: &Json<'_>, report: &mut Report) -> Option<NetworkFi
         let Some([from, to, most]) = inequality.list() else {
             report.mistake(
                 inequality.at,
-                "this is no inequality",
+                "this is not an inequality",
                 "write `[u, v, w]` for `v - u <= w`",
             );
             continue;

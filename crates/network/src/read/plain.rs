@@ -93,8 +93,8 @@ pub(super) fn read(text: &str, report: &mut Report) -> Option<NetworkFile> {
                 if section.is_none() {
                     report.mistake(
                         *place,
-                        "this heading is not known",
-                        "known are the kind of network, the numbers and the names of time points, \
+                        "unknown heading",
+                        "expected the kind of network, or the numbers or names of time points, \
                          ordinary edges and contingent links",
                     );
                 }
@@ -143,7 +143,7 @@ impl Reader {
             }
             Some(Section::Count(what)) => match first.parse() {
                 Ok(count) => self.declared_counts.push((what, count, at)),
-                Err(_) => report.mistake(at, "this is no count", "write a whole number"),
+                Err(_) => report.mistake(at, "this is not a count", "write a whole number"),
             },
             Some(Section::Names) => {
                 for (at, name) in words {
@@ -160,7 +160,7 @@ impl Reader {
         let [(from_at, from), (most_at, most), (to_at, to)] = words[..] else {
             report.mistake(
                 words[0].0,
-                "this is no edge",
+                "this is not an edge",
                 "write `X 12 C`: C comes at most 12 after X",
             );
             return;
@@ -186,7 +186,7 @@ impl Reader {
         else {
             report.mistake(
                 words[0].0,
-                "this is no contingent link",
+                "this is not a contingent link",
                 "write `A 1 3 C`: C comes 1 to 3 after A",
             );
             return;
@@ -222,12 +222,12 @@ impl Reader {
             if found == 0 && announced > 0 {
                 report.mistake(
                     at,
-                    format!("the file says that there are {announced} {name}, but has none"),
+                    format!("the file announces {announced} {name}, but contains none"),
                     "the file may be cut off",
                 );
             } else if found != announced {
                 report.remark(format!(
-                    "the file says that there are {announced} {name}, but has {found}"
+                    "the file announces {announced} {name}, but contains {found}"
                 ));
             }
         }
@@ -239,7 +239,7 @@ fn number(text: &str, at: usize, report: &mut Report) -> Option<Bound> {
     if read.is_none() {
         report.mistake(
             at,
-            format!("`{text}` is no number"),
+            format!("`{text}` is not a number"),
             "write a decimal such as 12.5",
         );
     }

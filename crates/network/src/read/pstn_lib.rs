@@ -68,7 +68,7 @@ fn points(
             report.mistake(
                 id.at,
                 format!("there are two time points with the id {number}"),
-                "give each a number of its own",
+                "give each a unique number",
             );
         }
     }
@@ -123,8 +123,8 @@ fn read_constraint(
         Some((at, _)) => {
             report.mistake(
                 at,
-                "this type of constraint is not known",
-                "known are \"stc\", \"stcu\" and \"pstc\"",
+                "unknown type of constraint",
+                "expected \"stc\", \"stcu\" or \"pstc\"",
             );
             return;
         }
@@ -203,7 +203,7 @@ fn read_correlation(
             _ => {
                 report.mistake(
                     constraint.at,
-                    "this is none of the probabilistic constraints, or one that was named before",
+                    "this is not one of the probabilistic constraints, or it is listed twice",
                     "list it under `constraints` with its distribution",
                 );
                 return;

@@ -63,7 +63,7 @@ impl Reader {
         if self.names.schemas.insert(name.to_string(), id).is_some() {
             self.report
                 .error(span, format!("an action `{name}` is declared already"))
-                .advise("give each action its own name");
+                .advise("give each action a unique name");
         }
         self.schema_spans.push(span);
         if !scope.controls.is_empty() {
@@ -116,7 +116,7 @@ impl Reader {
             };
             if value.is_none() {
                 self.report
-                    .warning(node.span, format!("nothing stands after `{keyword}`"));
+                    .warning(node.span, format!("expected a value after `{keyword}`"));
             }
             if fields.insert(keyword, (node.span, value)).is_some() {
                 self.report
@@ -148,7 +148,7 @@ impl Reader {
                 if scope.variable(name).is_some() {
                     self.report
                         .error(node.span, format!("`{name}` is a parameter already"))
-                        .advise("a number that the plan chooses needs a name of its own");
+                        .advise("give each number that the plan chooses a unique name");
                 }
             }
             let all = (0_u32..).take(scope.unknowns.len());
@@ -177,7 +177,7 @@ impl Reader {
             None => {
                 self.report
                     .warning(section.span, "a durative action without `:duration`")
-                    .advise("it may take any time; write `:duration ()` if that is meant");
+                    .advise("any duration is allowed; write `:duration ()` if that is intended");
             }
         }
         let condition = match fields.get(":condition") {

@@ -80,7 +80,7 @@ impl Reader {
         if count > 1 {
             self.report
                 .error(span, format!("{kind} `{name}` is declared already"))
-                .advise("give each its own name");
+                .advise("give each a unique name");
         }
     }
 

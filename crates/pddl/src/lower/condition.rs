@@ -87,7 +87,10 @@ impl Reader {
                         node.span,
                         format!("`{}` does not belong here", node.quote()),
                     )
-                    .advise("time specifiers belong into durative actions, and do not nest");
+                    .advise(
+                        "time specifiers are allowed only in durative actions, and not inside \
+                             each other",
+                    );
                 Condition::TRUE
             }
             _ => self

@@ -32,10 +32,13 @@ const ANONYMOUS: &str = "anonymous";
 /// Returns the place where forms of that name belong if they are not conditions on a state.
 pub(super) fn proper_place(name: &str) -> Option<&'static str> {
     if name == "preference" {
-        return Some("preferences stand among conditions, in goals and under `:constraints`");
+        return Some("preferences are allowed in conditions, in goals and under `:constraints`");
     }
     let is_modal = MODALS.iter().any(|(modal, _)| *modal == name);
-    is_modal.then_some("trajectory constraints belong under `:constraints`, and do not nest")
+    is_modal.then_some(
+        "trajectory constraints are allowed only under `:constraints`, and not \
+                        inside each other",
+    )
 }
 
 /// A preference found in a condition.
@@ -148,8 +151,8 @@ impl Reader {
                 let (begin, end) = (self.moment(from), self.moment(until));
                 if end <= begin {
                     self.report
-                        .error(until.span, "this time must be later than the one before")
-                        .advise("`hold-during` asks for the time from the first until the second");
+                        .error(until.span, "this time must be later than the first one")
+                        .advise("`hold-during` applies from the first time until the second");
                 }
                 Modal::HoldDuring(begin, end, self.hard_condition(c, scope))
             }
@@ -189,11 +192,11 @@ impl Reader {
         self.report
             .error(
                 node.span,
-                format!("`{}` does not say when it must hold", node.quote()),
+                format!("`{}` is not a trajectory constraint", node.quote()),
             )
             .advise(
                 "expected `(always …)`, `(sometime …)`, `(within time …)`, `(at end …)` or the \
-                 like; they do not nest, and stand under `and`, `forall` and `preference` only",
+                 like; they cannot be nested, except in `and`, `forall` and `preference`",
             );
     }
 
@@ -228,7 +231,7 @@ impl Reader {
             [name, part] if name.word().is_some() => (name.lower()?.into_owned(), part),
             _ => {
                 self.report
-                    .error(node.span, "this preference cannot be understood")
+                    .error(node.span, "invalid preference")
                     .advise("expected `(preference name condition)`");
                 return None;
             }
@@ -310,7 +313,7 @@ impl Reader {
         let near = nearest(&name, names.iter().map(String::as_str)).map(str::to_owned);
         self.report
             .error(node.span, format!("unknown preference `{name}`"))
-            .advise("preferences are declared where they stand: `(preference name condition)`")
+            .advise("declare it as `(preference name condition)`")
             .suggest(near.as_deref());
         None
     }

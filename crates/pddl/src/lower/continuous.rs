@@ -37,7 +37,7 @@ impl Reader {
                     format!("`{}` is not a rate times `#t`", value.quote()),
                 )
                 .advise(
-                    "what does not depend on `#t` belongs into an effect `at start` or `at end`",
+                    "write parts that do not depend on `#t` as an effect `at start` or `at end`",
                 );
             return None;
         }

@@ -66,7 +66,7 @@ impl Reader {
             if let Some(&again) = again {
                 self.report
                     .warning(node.span, format!("`{name}` is declared already"))
-                    .advise("its arguments may be of the types of either declaration");
+                    .advise("its arguments may have the types of either declaration");
                 let own = &mut self.problem.predicates[again.index()].parameters;
                 for (own, more) in own.iter_mut().zip(parameters) {
                     own.types.extend(more.types);
@@ -119,7 +119,7 @@ impl Reader {
                     *span,
                     format!("the values of `{name}` are numbers or objects"),
                 )
-                .advise("declare two functions");
+                .advise("declare one function for each");
         }
         let types = self.resolve_types(&entry.types);
         let same = self.names.object_functions.entry(name.clone()).or_default();

@@ -82,8 +82,8 @@ impl Reader {
                 }
                 _ => {
                     let advice = match moment {
-                        Moment::Process => "a process has no start and no end of its own",
-                        Moment::Instant => "only effects of durative actions have times",
+                        Moment::Process => "time specifier in an effect of a process",
+                        Moment::Instant => "only effects of durative actions have time specifiers",
                         _ => "effects of durative actions happen `at start` or `at end`",
                     };
                     self.report
@@ -114,7 +114,7 @@ impl Reader {
             ("when", _) if moment == Moment::Process => {
                 self.report
                     .error(node.span, "a conditional effect of a process")
-                    .advise("write a process of its own, with the condition as its precondition");
+                    .advise("write a separate process with the condition as its precondition");
             }
             ("when", [condition, part]) => {
                 let when = self.when(condition, moment, scope);
@@ -176,7 +176,7 @@ impl Reader {
                     self.report
                         .error(
                             node.span,
-                            format!("`{}` is no continuous change", node.quote()),
+                            format!("`{}` is not a continuous change", node.quote()),
                         )
                         .advise("effects of a process are `(increase (f) (* #t rate))`");
                 }
@@ -329,10 +329,7 @@ impl Reader {
             };
             if looks_ahead {
                 self.report
-                    .error(
-                        when.span,
-                        "a condition that is read after its effect happens",
-                    )
+                    .error(when.span, "the condition is read after its effect happens")
                     .advise("only effects `at end` may depend on conditions `at end`");
                 let label = self.report.label(node.span, "this is the effect");
                 self.report.attach(label);
@@ -362,7 +359,7 @@ impl Reader {
         self.report
             .error(
                 node.span,
-                format!("`{}` does not say when it happens", node.quote()),
+                format!("`{}` has no time specifier", node.quote()),
             )
             .advise(
                 "expected `(at start …)` or `(at end …)`, or for continuous change \

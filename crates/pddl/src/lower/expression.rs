@@ -97,16 +97,16 @@ impl Reader {
             "?duration" if scope.has_duration => Expression::Duration,
             "?duration" => {
                 self.report
-                    .error(node.span, "`?duration` means nothing here")
-                    .advise("it belongs into durative actions");
+                    .error(node.span, "`?duration` is not allowed here")
+                    .advise("it is defined only in durative actions");
                 WRONG
             }
             "#t" => {
                 self.report
-                    .error(node.span, "`#t` means nothing here")
+                    .error(node.span, "`#t` is not allowed here")
                     .advise(
-                        "it belongs into effects of processes, and into continuous effects of \
-                         durative actions, which stand outside of `at start` and `at end`",
+                        "it is defined only in effects of processes, and in continuous effects of \
+                         durative actions outside of `at start` and `at end`",
                     );
                 WRONG
             }
@@ -135,7 +135,7 @@ impl Reader {
         }
         self.report
             .error(node.span, format!("unknown number `{word}`"))
-            .advise("numbers that stay open are declared under `:synth-parameters`");
+            .advise("declare open numbers under `:synth-parameters`");
         WRONG
     }
 

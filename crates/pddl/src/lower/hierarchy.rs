@@ -91,7 +91,7 @@ impl Reader {
             self.report
                 .warning(
                     span,
-                    format!("`{name}` is not declared, and becomes a new type"),
+                    format!("`{name}` is not declared; it is added as a new type"),
                 )
                 .suggest(Some(near));
         }
@@ -130,17 +130,17 @@ impl Reader {
                 self.report
                     .error(
                         place(&ty.name),
-                        format!("`{}` is a subtype of itself, or of such a type", ty.name),
+                        format!("`{}` is in a cycle of subtypes, or below one", ty.name),
                     )
-                    .advise("remove the circle");
+                    .advise("remove the cycle");
             } else if paths[index] > MOST_PATHS || height[index] > HIGHEST {
                 self.report
                     .error(
                         place(&ty.name),
-                        format!("`{}` lies too deep in the type hierarchy", ty.name),
+                        format!("`{}` is too deep in the type hierarchy", ty.name),
                     )
                     .advise(format!(
-                        "at most {HIGHEST} types above each other, and {MOST_PATHS} ways up"
+                        "at most {HIGHEST} levels, and {MOST_PATHS} paths to supertypes"
                     ));
             } else {
                 continue;

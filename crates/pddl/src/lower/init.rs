@@ -53,7 +53,7 @@ impl Reader {
         }
         self.report
             .warning(init, "`(total-cost)` has no initial value: read as 0")
-            .advise("say `(= (total-cost) 0)`");
+            .advise("write `(= (total-cost) 0)`");
         self.problem
             .initial_values
             .push((cost, Vec::new(), Rational::ZERO));
@@ -81,7 +81,7 @@ impl Reader {
                     }
                 };
                 self.report
-                    .error(node.span, "this timed initial cannot be understood")
+                    .error(node.span, "invalid timed initial")
                     .advise(format!("write {text}"));
             }
             Some((head, [fluent, _]))
@@ -165,9 +165,9 @@ impl Reader {
             TimedChange::Assign(..) => "a second value for this fluent at the same time",
             _ => "this fact becomes both true and false at one time",
         };
-        self.report.error(content.span, message).advise(
-            "what happens at one time has no order: leave one out, or give it another time",
-        );
+        self.report
+            .error(content.span, message)
+            .advise("changes at the same time have no order: remove one, or give it another time");
     }
 
     /// Reads a change at time 0 or later. Returns `None` if it is not understood; this is reported

@@ -45,7 +45,7 @@ impl Reader {
             None => {
                 self.report
                     .warning(sections.name_span, "a problem without `:goal`")
-                    .advise("every plan reaches it; expected `(:goal condition)`");
+                    .advise("every plan reaches the goal; expected `(:goal condition)`");
             }
         }
         for section in sections.all(":constraints") {
@@ -118,7 +118,7 @@ impl Reader {
                     section.span,
                     format!("the goal reads `{name}`, which never gets a value"),
                 )
-                .advise(format!("say `(= {name} …)` under `:init`"));
+                .advise(format!("write `(= {name} …)` under `:init`"));
         }
     }
 
@@ -200,7 +200,7 @@ impl Reader {
 
     fn wrong_metric(&mut self, section: &Section) {
         self.report
-            .error(section.span, "this metric cannot be understood")
+            .error(section.span, "invalid metric")
             .advise("expected `(:metric minimize expression)` or `(:metric maximize expression)`");
     }
 }

@@ -117,7 +117,7 @@ impl<'t, 's> Sections<'t, 's> {
         report
             .error(
                 node.head_span(),
-                format!("`{}` stands outside of `(define …)`", node.quote()),
+                format!("`{}` is outside of `(define …)`", node.quote()),
             )
             .advise("check the parentheses before it: perhaps there is one `)` too many");
         if node.form().is_some_and(|(head, _)| head.starts_with(':')) {

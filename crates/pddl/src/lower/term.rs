@@ -219,7 +219,7 @@ impl Reader {
             self.report
                 .error(
                     node.head_span(),
-                    format!("`{name}` is a function, and no predicate"),
+                    format!("`{name}` is a function, not a predicate"),
                 )
                 .advise("compare its value with an object, as in `(= (f) object)`");
             return;
@@ -262,7 +262,7 @@ impl Reader {
         if let Some(number) = with_point(name) {
             diagnostic.advise(format!("write {number}"));
         } else if is_predicate {
-            diagnostic.advise("it is a predicate, and has no number as its value");
+            diagnostic.advise("it is a predicate, which has no numeric value");
         } else {
             diagnostic
                 .advise("declare it under `:functions`")
@@ -278,11 +278,11 @@ impl Reader {
                 .error(
                     span,
                     format!(
-                        "`{}` is defined by rules, and cannot be set",
+                        "`{}` is a derived predicate and cannot be set",
                         predicate.name
                     ),
                 )
-                .advise("change what its rules depend on");
+                .advise("change the facts that its rules read");
         }
     }
 }

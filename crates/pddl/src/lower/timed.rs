@@ -221,7 +221,7 @@ impl Reader {
         self.report
             .error(
                 node.span,
-                format!("`{}` does not say when it must hold", node.quote()),
+                format!("`{}` has no time specifier", node.quote()),
             )
             .advise("expected `(at start …)`, `(over all …)` or `(at end …)`")
             .suggest(near);

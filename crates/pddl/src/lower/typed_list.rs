@@ -52,10 +52,8 @@ impl Reader {
                 continue;
             };
             if first_untyped == entries.len() {
-                self.report.error(
-                    node.span,
-                    "`-` and a type, but nothing before it to be typed",
-                );
+                self.report
+                    .error(node.span, "`-` and a type without a name before it");
             }
             for entry in &mut entries[first_untyped..] {
                 entry.types = Rc::clone(&types);
@@ -137,13 +135,13 @@ impl Reader {
                         entry.node.span,
                         format!("`{}` is not a variable", entry.node.quote()),
                     )
-                    .advise("expected `?name`, and perhaps `- type` after it");
+                    .advise("expected `?name` or `?name - type`");
                 continue;
             };
             if name == "?duration" {
                 self.report
                     .error(entry.node.span, "`?duration` cannot be a parameter")
-                    .advise("it always means the action's duration");
+                    .advise("it is reserved for the action's duration");
             }
             if variables.iter().any(|v| v.name == *name) {
                 self.report

@@ -111,7 +111,7 @@ fn value(
     let value = expression.evaluate(&mut |leaf| {
         let value = match leaf {
             Expression::Fluent(fluent) => of(fluent),
-            _ => Err("the domain leaves it open".to_owned()),
+            _ => Err("the domain does not define it".to_owned()),
         };
         value.map_err(|text| mistake = Some(text)).ok()
     });

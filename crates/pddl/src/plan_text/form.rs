@@ -30,13 +30,13 @@ impl Form {
         Some(match self {
             Self::Ipc => return None,
             Self::PlanSys2 => {
-                "read as the terminal of PlanSys2 prints plans: time, action, duration"
+                "read as a plan from the terminal of PlanSys2: time, action, duration"
             }
             Self::UnifiedPlanning => {
-                "read as unified-planning prints plans: `time: action(argument, …) [duration]`"
+                "read as a plan of unified-planning: `time: action(argument, …) [duration]`"
             }
             Self::Words => {
-                "read as Aries prints plans, without parentheses: `time: action argument … [duration]`"
+                "read as a plan of Aries, without parentheses: `time: action argument … [duration]`"
             }
             Self::Ff => {
                 "read as the steps of FF: the numbers are not times, each action starts when the \

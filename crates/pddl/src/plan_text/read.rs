@@ -100,10 +100,7 @@ fn report_lines(report: &mut Report, lines: &LastPlan<'_>) {
                 .label(expected)
                 .advise(EXPECTED),
             MisreadKind::Possible => report
-                .error(
-                    place,
-                    "this line may hold an action, but cannot be read as one",
-                )
+                .error(place, "this line may contain an action, but cannot be read")
                 .advise(format!(
                     "{EXPECTED}; `;` before the line makes it a comment"
                 )),
@@ -136,7 +133,7 @@ fn report_lines(report: &mut Report, lines: &LastPlan<'_>) {
         if let Some(place) = first(&|step| step.form.note() == Some(note)) {
             report
                 .warning(place, note)
-                .advise(format!("the usual form is `{USUAL}`"));
+                .advise(format!("the usual format is `{USUAL}`"));
         }
     }
     let is_untimed = lines.steps.iter().all(|step| step.time.is_none());

@@ -113,7 +113,7 @@ impl<'a> StepReader<'a> {
                     self.report_missing_duration(name, &duration);
                     return Some(duration);
                 }
-                Err(why) => (why, "write it behind the action: `[10.000]`"),
+                Err(why) => (why, "write it after the action: `[10.000]`"),
             },
         };
         self.report
@@ -147,12 +147,12 @@ impl<'a> StepReader<'a> {
             return;
         }
         let message = format!(
-            "`{}` has no duration here: {duration} is taken, as the domain says",
+            "`{}` has no duration here: {duration} is used, from the domain",
             name.text
         );
         self.report
             .warning(span(&name.range), message)
-            .advise("write it behind the action, as in `[10.000]`; this is said once for all");
+            .advise("write it after the action, as in `[10.000]`; reported only once");
     }
 
     fn only_duration(&self, schema: SchemaId, arguments: &[ObjectId]) -> Result<Rational, String> {
@@ -175,12 +175,15 @@ impl<'a> StepReader<'a> {
                 let kind = if is_event { "an event" } else { "a process" };
                 self.report
                     .error(span(&word.range), format!("`{}` is {kind}", word.text))
-                    .advise("events and processes happen by themselves, and are no steps of plans");
+                    .advise(
+                        "events and processes happen by themselves and cannot be steps of \
+                             plans",
+                    );
                 return None;
             }
             self.report
                 .error(span(&word.range), format!("unknown action `{}`", word.text))
-                .advise("the domain has no action of this name")
+                .advise("the domain has no action with this name")
                 .suggest(near);
         }
         found
@@ -226,7 +229,7 @@ impl<'a> StepReader<'a> {
             self.report
                 .error(span(&(name.range.start..end)), message)
                 .advise(format!(
-                    "expected `{expected}`, with the numbers behind the objects"
+                    "expected `{expected}`, with the numbers after the objects"
                 ));
             return None;
         }
@@ -251,7 +254,7 @@ impl<'a> StepReader<'a> {
             let near = self.report.nearest(&name, names);
             self.report
                 .error(span(&word.range), format!("unknown object `{}`", word.text))
-                .advise("neither the domain nor the problem has an object of this name")
+                .advise("neither the domain nor the problem has an object with this name")
                 .suggest(near);
         }
         found

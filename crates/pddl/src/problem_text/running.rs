@@ -131,7 +131,7 @@ fn beyond_timed_initials(task: &Task, body: &DurativeBody) -> Option<String> {
         Change::Update { fluent, .. } => task.fluent_name(*fluent),
     };
     Some(format!(
-        "whether it changes {target} at its end is still open"
+        "it is undecided whether it changes {target} at its end"
     ))
 }
 
@@ -171,7 +171,7 @@ fn changes_at(
                     .ok_or_else(|| format!("its effect on {} at its end is unknown", name()))?;
                 let old = values.get(fluent).cloned();
                 let new = updated(*operator, old, &by)
-                    .ok_or_else(|| format!("{} has no value that it could change", name()))?;
+                    .ok_or_else(|| format!("{}, which it changes, has no value", name()))?;
                 values.insert(*fluent, new);
             }
         }

@@ -28,7 +28,7 @@ fn action_next_to_heading_is_an_error_with_its_line() {
         for at in 0..=plan.len() {
             let mut lines = plan.to_vec();
             lines.insert(at, heading);
-            let possible = "this line may hold an action, but cannot be read as one";
+            let possible = "this line may contain an action, but cannot be read";
             assert_eq!(
                 errors(&lines.join("\n")),
                 format!("{}: {possible}", at + 1),

@@ -38,7 +38,7 @@ pub(super) fn constraints(
         return Ok(Vec::new());
     }
     if constraints.depends_on_unknown_past() {
-        return Err(unsupported("trajectory constraints in mid-execution"));
+        return Err(unsupported("trajectory constraints during execution"));
     }
     let mut found = Vec::new();
     for modal in &constraints.hard {
@@ -91,7 +91,7 @@ fn happenings_by_time(
         let is_guarded = |effect: &Effect| !effect.guard.is_trivial() && concerns(effect);
         if effects(plan, node).iter().any(is_guarded) {
             return Err(unsupported(
-                "trajectory constraints on what conditional effects change",
+                "trajectory constraints on facts that conditional effects change",
             ));
         }
     }

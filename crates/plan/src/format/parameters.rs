@@ -119,7 +119,7 @@ pub(super) fn parameters(
     let mut parameters = Vec::with_capacity(drafts.len());
     for ((item, draft), nominal) in file.parameters.iter().zip(drafts).zip(nominal) {
         let Some(nominal) = nominal else {
-            let message = format!("no nominal value of `{}` can be found", item.name.text);
+            let message = format!("`{}` has no nominal value", item.name.text);
             mistakes.mistake(item.name.span, message, "give `default`".to_owned());
             continue;
         };

@@ -99,7 +99,7 @@ fn constraint(
         BoundText::Limit(Limit::Number(number), _) => Some(Bound::Finite(number.clone())),
         BoundText::Limit(limit, _) if limit == infinity => Some(Bound::Infinite),
         BoundText::Limit(_, span) => {
-            let message = "this infinity is on the wrong side: nothing could satisfy it";
+            let message = "infinite bound with the wrong sign: no times satisfy it";
             mistakes.mistake(*span, message, None);
             None
         }
@@ -119,8 +119,11 @@ fn constraint(
         (&item.lower, &item.upper)
         && least > most
     {
-        let message = format!("nothing lies between {least} and {most}");
-        let advice = "the lower bound stands first, and is not above the upper one".to_owned();
+        let message = format!(
+            "empty range: the lower bound {least} is above the upper bound \
+                               {most}"
+        );
+        let advice = "write the lower bound first".to_owned();
         mistakes.mistake(from.to(*to), message, advice);
     }
     Some(Constraint {
@@ -214,7 +217,7 @@ fn parameter_names<'a>(file: &File<'a>, mistakes: &mut Report) -> BTreeMap<&'a s
             mistakes.mistake(name.span, message, "choose another name".to_owned());
         }
         if names.insert(name.text, ParameterId::from(index)).is_some() {
-            let message = format!("two parameters are called `{}`", name.text);
+            let message = format!("two parameters have the name `{}`", name.text);
             mistakes.mistake(name.span, message, "names must differ".to_owned());
         }
     }

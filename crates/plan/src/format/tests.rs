@@ -171,13 +171,13 @@ c: m.start - .zero in [inf, inf];";
         refused(text),
         "\
 text:2:45: error: two instances are labelled `b`; labels must differ
-text:3:38: error: two parameters are called `speed`; names must differ
+text:3:38: error: two parameters have the name `speed`; names must differ
 text:3:65: error: `7` cannot be a parameter's name; choose another name
 text:4:4: error: there is no time point `n`; `n` takes time: write `n.start` or `n.end`
 text:4:8: error: there is no time point `b.end`; `b` is instantaneous: write `b`
 text:4:18: error: there is no parameter `sped`; did you mean `speed`?
 text:5:4: error: there is no time point `m.start`; did you mean `n.start`?
-text:5:24: error: this infinity is on the wrong side: nothing could satisfy it"
+text:5:24: error: infinite bound with the wrong sign: no times satisfy it"
     );
 }
 
@@ -190,7 +190,7 @@ fn missing_value_of_open_number_is_refused() {
     );
     assert_eq!(
         refused(&format!("parameter ?s;{navigate}")),
-        "text:1:11: error: no nominal value of `?s` can be found; give `default`"
+        "text:1:11: error: `?s` has no nominal value; give `default`"
     );
     assert_eq!(
         refused(&format!("parameter ?s default 3 ub 2;{navigate}")),
@@ -282,7 +282,6 @@ fn unsatisfiable_bound_is_reported_at_its_position() {
 c: b - .zero in [9, 8];";
     assert_eq!(
         refused(text),
-        "text:2:18: error: nothing lies between 9 and 8; the lower bound stands first, and is not \
-         above the upper one"
+        "text:2:18: error: empty range: the lower bound 9 is above the upper bound 8; write the lower bound first"
     );
 }

@@ -19,8 +19,8 @@ use crate::valuation::ParameterId;
 pub enum WriteError {
     /// The format supports only durations, bounds and the domain's `:synth-parameters`.
     #[error(
-        "an STN plan file cannot say what these parameters stand for: {}; leave them out, or name \
-         the numbers with `:synth-parameters` in the domain",
+        "an STN plan file cannot express these parameters: {}; remove them, or name the numbers \
+         with `:synth-parameters` in the domain",
         names.join(", ")
     )]
     NotExpressible {
@@ -28,7 +28,10 @@ pub enum WriteError {
         names: Vec<String>,
     },
     /// A label or a parameter's name would not be read as one name.
-    #[error("`{name}` is not allowed in an STN plan file: choose a name without spaces and marks")]
+    #[error(
+        "`{name}` is not allowed in an STN plan file: choose a name without spaces and \
+             punctuation"
+    )]
     Name {
         /// The label or name.
         name: String,

@@ -4,7 +4,7 @@
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ParametrizeError {
     /// The specification has a syntax error.
-    #[error("cannot understand `--vary {spec}`: expected {expected}")]
+    #[error("invalid `--vary {spec}`: expected {expected}")]
     Syntax {
         /// The text.
         spec: String,
@@ -42,7 +42,7 @@ pub enum ParametrizeError {
         why: String,
     },
     /// Several numbers match.
-    #[error("`--vary {spec}` could mean several things: {}; {advice}", choices.join(", "))]
+    #[error("`--vary {spec}` is ambiguous: {}; {advice}", choices.join(", "))]
     Ambiguous {
         /// The text.
         spec: String,

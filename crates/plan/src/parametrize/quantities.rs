@@ -153,7 +153,7 @@ impl ParametrizationBuilder<'_> {
                         others.find(|fluent| self.is_other_function(*fluent, target))
                     {
                         let name = self.task.fluent_name(other);
-                        why = format!("{why}; {name} says how much: `initial {name}`");
+                        why = format!("{why}; to vary the amount, write `initial {name}`");
                     }
                     return Err(nothing_matches(spec, why));
                 }
@@ -161,7 +161,7 @@ impl ParametrizationBuilder<'_> {
                     return Err(ParametrizeError::Ambiguous {
                         spec: spec.text.clone(),
                         choices: several.iter().map(ToString::to_string).collect(),
-                        advice: "add the one that is meant after the function",
+                        advice: "add the intended one after the function",
                     });
                 }
             };

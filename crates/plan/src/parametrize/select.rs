@@ -114,7 +114,7 @@ pub(super) fn fluent(
     let function = function(task, spec, name)?;
     let objects = objects(task, spec, arguments)?;
     let found = task.find_fluent(function, &objects);
-    found.ok_or_else(|| nothing_matches(spec, "nothing mentions such a fluent".to_owned()))
+    found.ok_or_else(|| nothing_matches(spec, "the problem does not use this fluent".to_owned()))
 }
 
 /// Returns the groups of timed initials that change the fact or fluent; at least one.

@@ -316,7 +316,7 @@ impl<'a> Words<'a> {
                 let atom: Vec<&str> = words.collect();
                 self.wrong(&format!("parentheses, as in `{kind} ({})`", atom.join(" ")))
             }
-            _ => self.wrong("`weight W`, `in [LB, UB]` or nothing more"),
+            _ => self.wrong("`weight W`, `in [LB, UB]` or the end"),
         }
     }
 

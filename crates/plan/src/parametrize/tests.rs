@@ -166,11 +166,11 @@ fn error_messages_name_the_expected_form() {
         ),
         (
             "n1 wieght 3",
-            "cannot understand `--vary n1 wieght 3`: expected `weight W`, `in [LB, UB]` or nothing more",
+            "invalid `--vary n1 wieght 3`: expected `weight W`, `in [LB, UB]` or the end",
         ),
         (
             "n1 in [4, 2]",
-            "cannot understand `--vary n1 in [4, 2]`: expected `[LB, UB]`",
+            "invalid `--vary n1 in [4, 2]`: expected `[LB, UB]`",
         ),
         (
             "n1 in [20, 30]",

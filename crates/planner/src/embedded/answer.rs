@@ -203,15 +203,15 @@ pub enum Proof {
         deadline: String,
     },
     /// All orders of happenings were tried.
-    #[error("no plan exists: every order of happenings was tried, {states} states in all")]
+    #[error("no plan exists: all orders of happenings were searched ({states} states)")]
     Exhausted {
         /// The number of states.
         states: u64,
     },
     /// All orders of happenings were tried without self-overlap.
     #[error(
-        "no plan exists without self-overlap: every order in which things can happen was tried, {states} states \
-         in all"
+        "no plan exists without self-overlap: all orders of happenings were searched ({states} \
+         states)"
     )]
     WithoutSelfOverlap {
         /// The number of states.

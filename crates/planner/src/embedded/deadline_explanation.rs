@@ -65,7 +65,7 @@ pub(crate) fn relaxed_proof(names: &Names, compiled: &Compiled) -> Option<Proof>
     if let Some((literal, end)) = relaxed.expired_goal() {
         let end = exact(&compiled.scale.units(end));
         let literal = names.literal(literal);
-        let why = format!("`{literal}` no longer holds from {end} on, whatever is done");
+        let why = format!("`{literal}` is false from {end} on in every plan");
         return Some(Proof::Unreachable(vec![why]));
     }
     if relaxed.evaluate(&initial).is_some() {

@@ -101,7 +101,7 @@ pub(super) fn plan(
     let constraints = task.constraints();
     let is_begun = *situation != Situation::initial(task) && !constraints.ignores_past();
     if is_begun || constraints.depends_on_unknown_past() {
-        return unsupported(task, "trajectory constraints in mid-execution");
+        return unsupported(task, "trajectory constraints during execution");
     }
     let mut search = Search {
         task,

@@ -143,7 +143,7 @@ impl Member {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum TuningError {
     /// There is no constant, technique or search of that name.
-    #[error("there is no `{name}`; choose one of {}", .known.join(", "))]
+    #[error("unknown setting `{name}`; choose one of {}", .known.join(", "))]
     Unknown {
         /// The requested name.
         name: String,
@@ -433,7 +433,7 @@ mod tests {
         let message = tuning.set("boost", "seven").unwrap_err().to_string();
         assert_eq!(message, "`boost` takes a whole number, not `seven`");
         let message = tuning.set("boots", "7").unwrap_err().to_string();
-        assert!(message.starts_with("there is no `boots`; choose one of first_round, "));
+        assert!(message.starts_with("unknown setting `boots`; choose one of first_round, "));
     }
 
     #[test]

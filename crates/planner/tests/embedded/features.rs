@@ -91,7 +91,7 @@ fn the_goal_counts_after_all_timed_initials() {
     let closed = "(:init (open) (at 17 (not (open)))) (:goal (and (in) (open)))";
     assert_eq!(
         plan(closed),
-        "no plan exists: `(open)` no longer holds from 17 on, whatever is done"
+        "no plan exists: `(open)` is false from 17 on in every plan"
     );
     let too_early = "(:init (open) (at 17 (not (open))) (at 20 (not (in)))) (:goal (in))";
     assert!(

@@ -90,7 +90,7 @@ fn each_constraint_changes_the_plan() {
 fn unsatisfiable_constraint_gives_no_plan() {
     assert_eq!(
         found("(always (not (at a)))"),
-        "no plan exists: the constraint (always (not (at a))) is broken from the beginning"
+        "no plan exists: the constraint (always (not (at a))) is violated from the beginning"
     );
     // Too early to get there.
     assert_eq!(found("(within 3 (seen c))"), "none found: Exhausted");
@@ -201,13 +201,13 @@ fn a_number_stays_within_bounds() {
     let full = of_tank("(always (and (>= (level) 0) (<= (level) 4)))", "");
     assert!(full.contains("(fill)") && full.contains("(take"), "{full}");
     assert!(of_tank("(always (and (>= (level) 0) (<= (used) 2)))", "").contains("none found"));
-    assert!(of_tank("(always (< (level) 2))", "").contains("broken from the beginning"));
+    assert!(of_tank("(always (< (level) 2))", "").contains("violated from the beginning"));
 }
 
 #[test]
 fn constraints_account_for_timed_initials() {
     let timed = "(open) (at 5 (not (open)))";
-    assert!(of_tank("(always (open))", timed).contains("is broken at 5"));
+    assert!(of_tank("(always (open))", timed).contains("is violated at 5"));
     let warm = of_tank("(always (or (open) (warm)))", timed);
     assert!(warm.contains("(warm)"), "{warm}");
     let owed = of_tank("(sometime-after (not (open)) (warm))", timed);
@@ -252,7 +252,7 @@ fn constraint_without_regression_is_refused_by_name() {
         "(and (at end (p)) (when (at start (q)) (at end (not (q)))))",
         "(always (q))",
     );
-    assert!(guarded.contains("conditions of other moments"), "{guarded}");
+    assert!(guarded.contains("conditions of other times"), "{guarded}");
 }
 
 #[test]
@@ -297,7 +297,7 @@ fn constraints_with_running_actions_are_refused() {
         ..Situation::initial(&task)
     };
     let answer = describe(&answer_from(&task, &later, 400));
-    assert!(answer.contains("in mid-execution"), "{answer}");
+    assert!(answer.contains("during execution"), "{answer}");
 }
 
 #[test]

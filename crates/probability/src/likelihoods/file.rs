@@ -89,7 +89,7 @@ impl Reader<'_> {
             Some(value) if value.get_ref().as_str() == Some(FORMAT) => {}
             Some(value) => self.mistakes.mistake(
                 value.span(),
-                "this is another kind of file",
+                "this is not a likelihood file",
                 format!("format = \"{FORMAT}\""),
             ),
             None => self.mistakes.mistake(
@@ -103,7 +103,7 @@ impl Reader<'_> {
                 DeValue::Integer(number) if number.as_str() == VERSION => {}
                 _ => self.mistakes.mistake(
                     value.span(),
-                    "this version is not known",
+                    "unsupported version",
                     format!("version = {VERSION}"),
                 ),
             },
@@ -379,7 +379,7 @@ impl Reader<'_> {
             DeValue::Float(number) => names::probability(number.as_str()),
             DeValue::Integer(number) => names::probability(number.as_str()),
             other => Err((
-                described(other).to_owned() + " stands here",
+                format!("found {}", described(other)),
                 Some("a probability, from 0 to 1".to_owned()),
             )),
         };
@@ -396,7 +396,7 @@ impl Reader<'_> {
         };
         let rate = read.filter(|rate| rate.is_finite() && *rate >= 0.0);
         if rate.is_none() {
-            let message = "this is no number of changes per second".to_owned();
+            let message = "this is not a number of changes per second".to_owned();
             let expected = "a rate, 0 or more: 0.1 is once in ten seconds on average";
             self.mistakes
                 .mistake(value.span(), message, expected.to_owned());

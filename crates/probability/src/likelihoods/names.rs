@@ -19,8 +19,8 @@ pub(super) fn predicate(problem: &Problem, name: &str) -> Result<PredicateId, Na
     };
     if problem.predicates[id.index()].is_derived {
         return Err((
-            format!("`{name}` follows from rules, so it has no likelihood of its own"),
-            Some("state those of the facts that its rules read".to_owned()),
+            format!("`{name}` is a derived predicate, so it cannot have likelihoods"),
+            Some("give likelihoods of the facts that its rules read".to_owned()),
         ));
     }
     Ok(id)

@@ -239,7 +239,7 @@ impl Reader<'_> {
                 };
                 self.mistakes.mistake(
                     separator.clone(),
-                    format!("the file says nothing of {first}{others}"),
+                    format!("the file has no line for {first}{others}"),
                     "one line for each fact, before this one".to_owned(),
                 );
             }

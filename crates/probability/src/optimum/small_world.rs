@@ -142,7 +142,7 @@ pub fn best_value(
     let process = Perturbed::new(model, settings)?;
     if table_search(&process).has_couplings() {
         return Err(TabulationError::Unsupported {
-            what: "actions need each other at one moment".to_owned(),
+            what: "actions need each other at the same time".to_owned(),
         });
     }
     Ok(process.optimum().value(&process, circumstances))

@@ -30,13 +30,13 @@ pub(super) fn check(model: &Model) -> Result<(), TabulationError> {
         .any(|event| !event.guard_memories.is_empty())
     {
         return Err(unsupported(
-            "effects depend on what held throughout an action",
+            "effects depend on over-all conditions of an action",
         ));
     }
     let remembers = |event: &Event| event.effects.iter().any(|effect| effect.is_certain);
     if model.events.iter().any(remembers) {
         return Err(unsupported(
-            "effects depend on what held at the start of an action",
+            "end effects depend on conditions at the start of an action",
         ));
     }
     Ok(())

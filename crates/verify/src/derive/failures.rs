@@ -175,7 +175,7 @@ pub(super) fn throughout(
     let name = &subject.steps[step].action.name;
     let what = || {
         let condition = subject.task.describe_condition(condition);
-        format!("{condition}, which {name} needs throughout")
+        format!("{condition}, an over-all condition of {name}")
     };
     let moment = subject.points.len();
     let planned = subject.steps[step].duration.clone().map(Linear::number);

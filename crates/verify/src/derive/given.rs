@@ -98,7 +98,7 @@ impl<'a> Given<'a> {
             expression.visit_leaves(&mut |leaf| is_open |= matches!(leaf, Expression::Unknown(_)));
         });
         if is_open {
-            let what = "the goal, which has a number that the domain leaves open";
+            let what = "the goal, which has an open number";
             return Err(NotDerived::unknown(what));
         }
         Ok(given)
@@ -179,7 +179,7 @@ impl<'a> Given<'a> {
         let known = self.plan.parameters.len();
         if let Some(more) = certificate.parameters.get(known) {
             let what = format!(
-                "{}, which the plan file does not leave open: `--vary` with a plan file that has \
+                "{}, which is not a parameter of the plan file: `--vary` with a plan file that has \
                  constraints",
                 more.name
             );

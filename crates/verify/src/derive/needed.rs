@@ -36,7 +36,10 @@ pub(super) fn check(
             reader.sets(constraint)? || reader.orders(constraint) || course.implies(constraint);
         if !is_needed && !reader.fixes_controllable_duration(index) {
             let [from, to] = [constraint.from, constraint.to].map(|point| reader.name(point));
-            let what = format!("constraint {index}, from `{from}` to `{to}`, is none of the plan");
+            let what = format!(
+                "constraint {index}, from `{from}` to `{to}`, is not a constraint \
+                                of the plan"
+            );
             return Err(if subject.is_plain {
                 NotDerived::differs(what)
             } else {
@@ -50,7 +53,10 @@ pub(super) fn check(
     let timed = (0..subject.points.len()).filter(timed);
     for point in durations.chain(timed) {
         if !reader.set.contains(&point) {
-            let what = format!("nothing says when `{}` happens", subject.label(point));
+            let what = format!(
+                "no constraint defines the time of `{}`",
+                subject.label(point)
+            );
             return Err(NotDerived::differs(what));
         }
     }
@@ -190,7 +196,7 @@ impl Reader<'_> {
         }
         let constraint = &self.certificate.constraints[first];
         let what = format!(
-            "an inequality that may depend on the duration from `{}` to `{}` being the planned one",
+            "an inequality that may hold only for the nominal duration from `{}` to `{}`",
             self.name(constraint.from),
             self.name(constraint.to)
         );

@@ -350,7 +350,7 @@ impl<'a> Subject<'a> {
             for constraint in &body.duration {
                 if !is_of_state(&constraint.bound) {
                     let what = format!(
-                        "a bound that is no number on the duration of {}",
+                        "a non-numeric bound on the duration of {}",
                         step.action.name
                     );
                     return Err(NotDerived::Unknown(what));

@@ -44,7 +44,7 @@ impl TrajectoryDerivation {
     pub(super) fn new(subject: &Subject<'_>) -> Result<Self, NotDerived> {
         let constraints = subject.task.constraints();
         if !constraints.hard.is_empty() && constraints.depends_on_unknown_past() {
-            let what = "constraints on the course of a plan that has begun before";
+            let what = "trajectory constraints during execution";
             return Err(NotDerived::unknown(what));
         }
         let mut course = Self(Vec::new());
@@ -76,8 +76,8 @@ impl TrajectoryDerivation {
             }
             if !holds {
                 let what = format!(
-                    "in some schedules of the network, the times of `{}` and `{}` break a constraint on the \
-                     course of the plan",
+                    "in some schedules of the network, the times of `{}` and `{}` violate a \
+                     trajectory constraint",
                     subject.label(from),
                     subject.label(to)
                 );

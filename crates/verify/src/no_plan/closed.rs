@@ -109,7 +109,7 @@ impl<'a> Closure<'a> {
         let mut names = BTreeMap::new();
         for (number, process) in processes.iter().enumerate() {
             if names.insert(process.title(), number).is_some() {
-                return Err(NoPlanFlaw::Unknown("an action that is running twice"));
+                return Err(NoPlanFlaw::Unknown("an action with two running instances"));
             }
         }
         let mut closure = Self {
@@ -361,7 +361,7 @@ impl<'a> Closure<'a> {
             Change::Add(fact) | Change::Delete(fact) => self.facts.contains(fact),
         });
         if open.len() > MAX_OPEN {
-            return Err(NoPlanFlaw::Unknown("too many effects that are undecided"));
+            return Err(NoPlanFlaw::Unknown("too many undecided effects"));
         }
         let subsets = (0..1_usize << open.len()).map(|subset| {
             let mut own = after.clone();

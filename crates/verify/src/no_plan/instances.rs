@@ -204,7 +204,7 @@ impl Instances {
         for running in &self.initial.running {
             for (fact, time) in facts_achieved_by_end(&moments, running) {
                 note(fact, &time, &|| {
-                    format!("`{}`, under way", running.action.name)
+                    format!("`{}`, running", running.action.name)
                 });
             }
         }

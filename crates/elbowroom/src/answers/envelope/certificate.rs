@@ -366,7 +366,7 @@ fn proof_of(subject: &Subject<'_>, cut: &Cut) -> Proof {
             sums: sums(cut),
         },
         Ground::Box(_) => Proof::Assumed {
-            why: "the plan does not work everywhere in a box that breaks all of these".to_owned(),
+            why: "the plan fails for some values in each box that violates all of these".to_owned(),
             sums: sums(cut),
         },
     }

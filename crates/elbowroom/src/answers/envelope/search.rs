@@ -59,7 +59,7 @@ pub(super) fn search(
         Err(objection) => {
             let point = DecoupledEnvelope::point(&subject.plan.nominal());
             let why_not = subject.explainer.objection(&oracle, &point, &objection);
-            subject.reject_unproved_objection("the plan as it is", &why_not)?;
+            subject.reject_unproved_objection("the nominal plan", &why_not)?;
             return Ok(subject.failure_outcome(why_not));
         }
     };

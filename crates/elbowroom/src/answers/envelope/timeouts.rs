@@ -44,8 +44,8 @@ pub(crate) fn unknown_action(rule: &TimeoutRule, problem: &Problem) -> Option<St
     };
     let unknown = rule.names().find(|name| !is_known(name))?;
     Some(format!(
-        "the time-outs name `{unknown}`, which is no action of this problem; write `drive=40`, or \
-         `(drive a b)=40` for one with its objects"
+        "unknown action `{unknown}` in the time-outs; write `drive=40`, or `(drive a b)=40` with \
+         the objects"
     ))
 }
 
@@ -124,8 +124,8 @@ impl Subject<'_> {
         let interval = envelope.interval(id);
         let upper = interval.upper.value();
         let may_take = match upper {
-            Some(upper) => format!("as long as {}", upper.to_decimal(3)),
-            None => "any time".to_owned(),
+            Some(upper) => format!("up to {}", upper.to_decimal(3)),
+            None => "arbitrarily long".to_owned(),
         };
         let message = format!(
             "{} may be {may_take} in this box, but the action times out after {}; give a smaller \

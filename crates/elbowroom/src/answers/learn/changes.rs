@@ -72,8 +72,8 @@ impl ExpectedChanges {
             return Ok(expected);
         }
         Err(RequestError::Unsupported(
-            "no log tells of facts, so there is nothing to compare with the world that was \
-             expected: traces of `elbowroom run --trace` do, tables of attempts do not"
+            "no log records facts, so no comparison with the expected world is possible: give \
+             traces of `elbowroom run --trace`; tables of attempts contain no facts"
                 .to_owned(),
         ))
     }

@@ -109,8 +109,8 @@ impl LatticeAnswer {
     pub fn picture(&self, title: &str) -> LatticePicture {
         let best = self.sets.first().map_or(0.0, |set| set.best);
         let subtitle = format!(
-            "{} orders; the best succeeds with probability {best:.4}. The darker, the better the best order \
-             through it; hover for more.",
+            "{} orders; the best succeeds with probability {best:.4}. A darker node has a better \
+             best order; hover for details.",
             self.orders
         );
         LatticePicture {
@@ -122,7 +122,7 @@ impl LatticeAnswer {
                 .map(|set| PictureNode {
                     level: set.happenings.len(),
                     words: if set.happenings.is_empty() {
-                        "nothing yet".to_owned()
+                        "no happening yet".to_owned()
                     } else {
                         set.happenings.join(", ")
                     },

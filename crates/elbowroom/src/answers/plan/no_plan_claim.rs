@@ -20,7 +20,7 @@ impl SearchMonitor<'_> {
         counts: Counts,
     ) -> (PlanFinding, PlanStop) {
         let evaluated = counts.evaluated;
-        let ended = format!("the search ended without one, after {evaluated} states");
+        let ended = format!("the search ended without a plan after {evaluated} states");
         if !matches!(proof, Proof::WithoutSelfOverlap { .. }) {
             return self.claimed_finding(
                 task,

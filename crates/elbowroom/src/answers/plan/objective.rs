@@ -259,7 +259,7 @@ fn compare_candidates(
             // dropped.
             best.get_or_insert(EvaluatedPlan::unknown(
                 candidate,
-                "the search was ended before",
+                "the search stopped before its evaluation",
             ));
             break;
         };

@@ -98,7 +98,7 @@ pub fn picture(
         (box_name(name), corners)
     });
     let subtitle = match plane.others {
-        Others::Nominal => "A slice: all other quantities as planned",
+        Others::Nominal => "A slice: all other quantities at their nominal values",
         Others::Any => "A projection: for some values of all other quantities",
     };
     Ok(PlanePicture {

@@ -89,7 +89,7 @@ impl Subject {
         let is_made = added.any(|adds| adds.contains(fact));
         let is_so = self.task.initial().facts.contains(fact);
         if is_made || is_so || self.task.is_derived(*fact) {
-            format!("{words}, which is not so there in the order of the plan")
+            format!("{words}, which is false at that point in the order of the plan")
         } else {
             format!("{words}, which nothing in the plan makes true")
         }

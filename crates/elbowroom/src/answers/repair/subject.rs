@@ -130,7 +130,7 @@ impl Subject {
         Err(ParametrizeError::NothingMatches {
             spec: spec.map(ToString::to_string).unwrap_or_default(),
             why: format!(
-                "how long {} takes depends on what changes in the course of the plan",
+                "the duration of {} depends on values that change during the plan",
                 self.original.instance(instance).action.name
             ),
         })

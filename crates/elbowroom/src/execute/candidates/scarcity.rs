@@ -45,10 +45,7 @@ impl Scarcity {
         let rule = self.of.and_then(|place| world?.amounts.get(place));
         let what = rule.map_or("amounts".to_owned(), |rule| rule.fluent.to_string());
         let quantile = self.quantile;
-        format!(
-            "for {what} as scarce as in all but {} of 100 cases",
-            100 - quantile
-        )
+        format!("for {what} scarcer than in {quantile} % of cases")
     }
 
     /// Makes amounts scarce: the quantile of consumption, and the opposite quantile of production,

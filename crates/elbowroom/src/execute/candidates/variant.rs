@@ -99,9 +99,7 @@ impl Variant {
         match self.pace {
             Pace::Planned => {}
             Pace::Quantile(quantile) => {
-                words.push(format!(
-                    "for durations that {quantile} of 100 do not exceed"
-                ));
+                words.push(format!("for durations at their {quantile} % quantiles"));
             }
             Pace::Slower(percent) => {
                 words.push(format!("for durations {} % longer", percent - 100));
@@ -111,7 +109,7 @@ impl Variant {
             words.push(scarcity.describe(world));
         }
         if self.is_reliable {
-            words.push("of actions that seldom fail".to_owned());
+            words.push("of actions that rarely fail".to_owned());
         }
         if !self.without.is_empty() {
             let without: Vec<&str> = self.without.iter().map(String::as_str).collect();

@@ -46,20 +46,23 @@ pub enum SpecError {
     Likelihoods(Diagnostics),
     /// The problem has a part that executors do not support.
     #[error(
-        "plans cannot be executed here: executors do not support {0} yet, which the domain has"
+        "plans cannot be executed here: the domain has {0}, which executors do not support yet"
     )]
     UnsupportedFeature(&'static str),
     /// The time-outs name an action that the problem does not have.
     #[error("{0}")]
     Timeout(String),
     /// The executor compares plans in the world of a world file, but there is none.
-    #[error("`{0}` must know how the world behaves")]
+    #[error("`{0}` needs a model of the world")]
     NeedsWorld(ExecutorSpec),
     /// The executor compares plans of the embedded planner, but another planner is given.
-    #[error("`{0}` chooses among plans of the embedded planner")]
+    #[error("`{0}` needs the embedded planner, because it chooses among its plans")]
     NeedsEmbedded(ExecutorSpec),
     /// Self-overlap was allowed, but the plans come from another planner, or there is no planner.
-    #[error("self-overlap can be allowed in plans of the embedded planner only, not of `{0}`")]
+    #[error(
+        "only plans of the embedded planner can be allowed to have self-overlap, not plans of \
+             `{0}`"
+    )]
     SelfOverlap(String),
     /// The likeliest first plan was requested, but it cannot be chosen.
     #[error("the likeliest first plan cannot be chosen: {0}")]
@@ -86,13 +89,13 @@ pub enum FirstPlanError {
     #[error("a plan is given")]
     Given,
     /// Another planner was named, whose plan is used without a choice.
-    #[error("it is one of the embedded planner's")]
+    #[error("only plans of the embedded planner can be compared")]
     ExternalPlanner,
     /// There is no world file, and there are no likelihoods.
-    #[error("nothing is known of the world")]
+    #[error("there is no model of the world")]
     NoWorldKnowledge,
     /// Goals are given later.
-    #[error("the goals are still to come")]
+    #[error("the goals are given later")]
     Persistent,
 }
 
@@ -101,7 +104,7 @@ pub enum FirstPlanError {
 #[non_exhaustive]
 pub enum AdversaryError {
     /// There is no plan.
-    #[error("there is no plan to spoil")]
+    #[error("the adversary needs a plan")]
     NoPlan,
     /// The plan cannot be prepared.
     #[error(transparent)]
@@ -110,10 +113,10 @@ pub enum AdversaryError {
     #[error(transparent)]
     Box(#[from] BoxTextError),
     /// The plan has no envelope, and no box was given.
-    #[error("the plan has no envelope to spoil it in")]
+    #[error("the plan has no envelope from which the adversary could choose values")]
     NoEnvelope,
     /// The plan's constraints are inconsistent.
-    #[error("in this box nothing satisfies the plan's constraints")]
+    #[error("no values in this box satisfy the plan's constraints")]
     Empty,
 }
 
@@ -488,7 +491,8 @@ impl RunSpec {
         match policy.map_err(|error| error.what)? {
             Some(policy) => Ok(Arc::new(policy)),
             None if goes_on() => Err(
-                "it would have too many states, or its bounds would stay more than two points apart"
+                "it would have too many states, or its bounds would stay more than 2 percentage \
+                 points apart"
                     .to_owned(),
             ),
             None => Err("the planning budget is spent (`--planning-budget`)".to_owned()),

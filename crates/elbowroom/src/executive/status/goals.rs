@@ -23,7 +23,7 @@ const CANCELLED: &str = "cancelled";
 const FAILED: &str = "failed";
 
 /// Reason for the state of a queued goal.
-const NOT_RELEASED: &str = "its release time has not come";
+const NOT_RELEASED: &str = "its release time is in the future";
 
 /// Reason for the state of a queued goal to keep.
 const OTHERS_FIRST: &str = "it does not hold; other goals are pursued first";

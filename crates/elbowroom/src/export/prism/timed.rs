@@ -151,7 +151,8 @@ impl Process<'_> {
             Bound::Lower => {
                 text.push_str(
                     "// <<agent>> Pmax=? [F \"goal\"] is a lower bound: the agent decides at the boundaries of cells,\n\
-                     // and what happens between them happens in the order that is worst for it.\n\nsmg\n\n",
+                     // and the events between them happen in the order that is worst for it.\n\n\
+                     smg\n\n",
                 );
                 let list = |is_agents: bool, others: &[&str]| {
                     let own = happenings.iter().filter(|it| it.is_agents == is_agents);
@@ -174,8 +175,9 @@ impl Process<'_> {
                 );
             }
             Bound::Upper => text.push_str(
-                "// Pmax=? [F \"goal\"] is an upper bound: the agent is told at the beginning of a cell what it brings,\n\
-                 // and chooses the order of what happens in it.\n\nmdp\n\n",
+                "// Pmax=? [F \"goal\"] is an upper bound: the agent observes all events of a cell at its beginning,\n\
+                 // and chooses their order.\n\n\
+                 mdp\n\n",
             ),
         }
         let goal = self.holds(&self.world.goal);
@@ -253,7 +255,7 @@ impl Process<'_> {
                 let begins = self.has_initial_events();
                 let _ = writeln!(
                     text,
-                    "  // 0: at the boundary before the cell; 1: in it; 2 and 3: what happens before all else.\n  \
+                    "  // 0: at the boundary before the cell; 1: in it; 2 and 3: initial events.\n  \
                      phase : [0..3] init {};",
                     if begins { 2 } else { 0 }
                 );
@@ -284,7 +286,7 @@ impl Process<'_> {
             }
             Bound::Upper => {
                 text.push_str(
-                    "  // 0: what the cell brings is drawn; 1: the agent chooses; 2: after the last cell.\n  \
+                    "  // 0: the events of the cell are drawn; 1: the agent chooses; 2: after the last cell.\n  \
                      phase : [0..2] init 0;\n",
                 );
                 for happening in happenings {
@@ -326,7 +328,7 @@ impl Process<'_> {
     /// ever became false.
     fn write_final_commands(&self, text: &mut String) {
         text.push_str(
-            "  // Facts that could still become true if no fact became false any more.\n",
+            "  // Facts that could still become true if facts never became false again.\n",
         );
         let mut hope = |guard: Formula, adds: Facts| {
             if adds != 0 && guard != Formula::FALSE {

@@ -235,8 +235,9 @@ impl<'p> Process<'p> {
         let _ = writeln!(
             text,
             "// The problem {} of the domain {}, without time.\n\
-             // Pmax=? [F \"goal\"] is the greatest probability with which anyone reaches the goal that\n\
-             // sees the state after each step.\n\nmdp\n",
+             // Pmax=? [F \"goal\"] is the greatest probability of reaching the goal for an agent that\n\
+             // observes the state after each step.\n\n\
+             mdp\n",
             problem.name, problem.domain
         );
         let under_way: Vec<String> = self
@@ -256,7 +257,7 @@ impl<'p> Process<'p> {
             self.condition(self.task().goal())
         );
         if let Some(dead_end) = &self.dead_end {
-            text.push_str("// There is no way to the goal even if nothing goes wrong any more.\n");
+            text.push_str("// The goal is unreachable even if nothing else fails.\n");
             let _ = writeln!(text, "formula dead_end = {dead_end};");
         }
         let ready = match self.settings.dead_ends {
@@ -275,15 +276,15 @@ impl<'p> Process<'p> {
         text.push_str("module agent\n");
         let _ = writeln!(
             text,
-            "  // 0: the agent chooses; 1 to {}: the effects of a happening; {}: nothing came of it, and facts\n  \
-             // change by themselves.",
+            "  // 0: the agent chooses; 1 to {}: the effects of a happening; {}: it failed without\n  \
+             // effects, and facts change by themselves.",
             happenings.len(),
             phases.nothing
         );
         if !failures.is_empty() {
             let _ = writeln!(
                 text,
-                "  // {} to {}: what failed ends leave behind.",
+                "  // {} to {}: effects of failed ends.",
                 happenings.len() + 1,
                 happenings.len() + failures.len()
             );
@@ -305,7 +306,7 @@ impl<'p> Process<'p> {
         if let DeadEnds::Patience(steps) = self.settings.dead_ends {
             let steps = steps.max(1);
             text.push_str(
-                "  // How many more steps may end in a dead end; the last of them ends the run.\n",
+                "  // Remaining number of steps that may end in a dead end; the last one ends the run.\n",
             );
             let _ = writeln!(text, "  rounds : [0..{steps}] init {steps};");
         }
@@ -333,7 +334,7 @@ impl<'p> Process<'p> {
             let _ = writeln!(text, "  [step_{step}] phase={step} -> (phase'={after});");
         }
         self.write_change_commands(&phases, text);
-        text.push_str("  // Whoever stops, stops.\n");
+        text.push_str("  // The run stays stopped.\n");
         text.push_str("  [stop] phase=0 -> true;\nendmodule\n\n");
         Ok(())
     }

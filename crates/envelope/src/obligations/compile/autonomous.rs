@@ -74,8 +74,8 @@ impl AutonomousModel {
                 _ => {
                     return Err(Refusal::Nature {
                         place: task.describe_modal(constraint),
-                        obstacle: "of constraints on the course, only those with `always` are \
-                                   analysed together with processes and events"
+                        obstacle: "together with processes and events, `always` is the only \
+                                   supported trajectory constraint"
                             .to_owned(),
                     });
                 }
@@ -224,8 +224,8 @@ impl Compiler<'_> {
     pub(super) fn guard_depends(&self, node: NodeId) -> Refusal {
         Refusal::Nature {
             place: self.plan.plan.describe_node(self.task, node),
-            obstacle: "whether a conditional effect comes about depends on times or parameters, \
-                       and the course of processes and events with it"
+            obstacle: "a conditional effect, on which processes and events depend, may or may not \
+                       occur, depending on times or parameters"
                 .to_owned(),
         }
     }

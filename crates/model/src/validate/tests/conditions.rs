@@ -189,7 +189,7 @@ fn open_number_is_undecided() {
     let world = World::new("(= x 0)").instant("go", "(> x ?open)", "");
     assert_eq!(
         world.judge("1: go"),
-        "undecided: at 1.000: ?parameter0 is left open and read by (> (x) ?parameter0): give it a value"
+        "undecided: at 1.000: (> (x) ?parameter0) reads the open number ?parameter0: give it a value"
     );
 }
 

@@ -129,7 +129,7 @@ fn exponential_change_is_undecided() {
     assert_eq!(
         world.judge("2: a [4]"),
         "undecided: at 2.000: nonlinear change: the rate of (x) depends on (x) itself, so its \
-         value is no polynomial in time"
+         value is not a polynomial in time"
     );
 }
 

@@ -46,7 +46,7 @@ fn conflicting_assignments_of_one_happening_are_refused() {
     let world = World::new("(= x 1)").instant("go", "", "(assign x 2) (increase x 1)");
     assert_eq!(
         world.judge("1: go"),
-        "at 1.000: (go) gives (x) several values at once"
+        "at 1.000: (go) gives (x) several values at the same time"
     );
 }
 

@@ -195,7 +195,7 @@ impl<'s> Cursor<'s> {
         if son.text.eq_ignore_ascii_case("TRUESON:") {
             return Err((
                 at,
-                "the plan branches here: only a plan without branches has fixed times",
+                "the plan branches here: only plans without branches are supported",
             ));
         }
         self.skip_space();

@@ -27,7 +27,7 @@ pub(super) fn check(action: &ground::Action) -> Result<(), Unsupported> {
         None
     });
     if has_unknown {
-        return refuse("numbers left open (:synth-parameters)");
+        return refuse("open numbers (:synth-parameters)");
     }
     let Some(body) = action.durative() else {
         return Ok(());

@@ -18,7 +18,7 @@ const MAX_CLAUSES: usize = 5_000;
 const LONG: Obstacle =
     Obstacle::Feature("trajectory constraints on recursive derived facts or long formulas");
 pub(super) const GUARDED: Obstacle = Obstacle::Feature(
-    "trajectory constraints on what effects under conditions of other moments change",
+    "trajectory constraints on facts changed by effects with conditions of other times",
 );
 pub(super) const MOVING: Obstacle = Obstacle::Feature(
     "trajectory constraints on numbers that change continuously, at given times, or in many ways",
@@ -433,7 +433,7 @@ impl<'a> Rewriting<'a> {
             if is_never && !self.holds_initially(&one.clause) {
                 let constraint = one.constraint;
                 return Err(Obstacle::ConstraintViolated(format!(
-                    "the constraint {constraint} is broken from the beginning"
+                    "the constraint {constraint} is violated from the beginning"
                 )));
             }
             let is_static = |literal: &Literal| match &literal.subject {

@@ -16,7 +16,7 @@ use super::regression::any;
 use super::rewriting::{Consequence, Rewriting, WatchedClause};
 
 const ENDED: Obstacle = Obstacle::Feature(
-    "trajectory constraints under which timed initials may end what holds once at most",
+    "trajectory constraints on conditions that may hold only once and that timed initials end",
 );
 
 impl Rewriting<'_> {
@@ -91,7 +91,7 @@ impl Rewriting<'_> {
                 return Err(ENDED);
             }
             return Err(Obstacle::ConstraintViolated(format!(
-                "the constraint {} is broken at {}",
+                "the constraint {} is violated at {}",
                 one.constraint,
                 time.to_decimal(3)
             )));

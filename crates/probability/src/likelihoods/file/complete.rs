@@ -48,7 +48,7 @@ impl Reader<'_> {
             if let Some(fact) = missing {
                 self.mistakes.mistake(
                     section("facts"),
-                    format!("the file does not say how {fact} changes by itself"),
+                    format!("the file does not define how {fact} changes by itself"),
                     format!("[facts.{}], or [defaults]", predicate.name),
                 );
             }
@@ -87,7 +87,7 @@ impl Reader<'_> {
         if let Some(missing) = missing {
             self.mistakes.mistake(
                 section.clone(),
-                format!("the file does not say {missing}"),
+                format!("the file does not define {missing}"),
                 format!("[actions.{}], or [defaults]", schema.name),
             );
         }

@@ -59,7 +59,7 @@ impl Reader<'_> {
         };
         let rate = read.filter(|rate| rate.is_finite() && *rate >= 0.0);
         if rate.is_none() {
-            let message = "this is no number of failures per second";
+            let message = "this is not a number of failures per second";
             let expected = "a rate, 0 or more: 0.01 is once in a hundred seconds on average";
             self.mistakes
                 .mistake(value.span(), message, expected.to_owned());
@@ -71,7 +71,7 @@ impl Reader<'_> {
         if let DeValue::Boolean(truth) = value.get_ref() {
             return Some(*truth);
         }
-        let message = format!("{} stands here", described(value.get_ref()));
+        let message = format!("found {}", described(value.get_ref()));
         let expected = "true or false".to_owned();
         self.mistakes.mistake(value.span(), message, expected);
         None
@@ -94,7 +94,7 @@ impl Reader<'_> {
             // Decimal fractions do not add up to exactly 1 in binary.
             if sum > 1.0 + 1e-9 {
                 let message = format!("with this outcome the probabilities add up to {sum}");
-                let expected = "shares of the failures, so 1 is the most".to_owned();
+                let expected = "shares of the failures, at most 1 in total".to_owned();
                 self.mistakes.mistake(entry.span(), message, expected);
                 return None;
             }
@@ -105,7 +105,7 @@ impl Reader<'_> {
 
     fn outcome(&mut self, schema: Option<SchemaId>, entry: &Value<'_>) -> Option<Outcome> {
         let DeValue::Table(table) = entry.get_ref() else {
-            let message = format!("{} stands here", described(entry.get_ref()));
+            let message = format!("found {}", described(entry.get_ref()));
             let expected = "a table: [[actions.NAME.outcome]]".to_owned();
             self.mistakes.mistake(entry.span(), message, expected);
             return None;
@@ -131,8 +131,8 @@ impl Reader<'_> {
         };
         if changes.is_empty() && !self.mistakes.is_failed() {
             let message = "this outcome changes nothing".to_owned();
-            let expected = "becomes_true or becomes_false; what the outcomes leave of 1 is the \
-                            failure that changes nothing"
+            let expected = "becomes_true or becomes_false; the rest up to 1 is the probability of \
+                            a failure without effects"
                 .to_owned();
             self.mistakes.mistake(entry.span(), message, expected);
             return None;
@@ -159,7 +159,7 @@ impl Reader<'_> {
         };
         for entry in entries {
             let Some(text) = entry.get_ref().as_str() else {
-                let message = format!("{} stands here", described(entry.get_ref()));
+                let message = format!("found {}", described(entry.get_ref()));
                 let expected = "facts: [\"(on ?box floor)\"]".to_owned();
                 self.mistakes.mistake(entry.span(), message, expected);
                 continue;
@@ -234,7 +234,7 @@ impl Reader<'_> {
         types: &[TypeId],
     ) -> Result<usize, EntryError> {
         let Some(schema) = schema else {
-            let message = format!("`{word}` is a parameter of no action that is named here");
+            let message = format!("`{word}` is not a parameter of any action named here");
             return Err((message, Some("[[actions.NAME.outcome]]".to_owned())));
         };
         let schema = &self.problem.schemas[schema.index()];
@@ -257,7 +257,10 @@ impl Reader<'_> {
         if is_empty || objects.any(|object| self.problem.has_type(object, types)) {
             Ok(place)
         } else {
-            let message = format!("no object that `{word}` can be is of the right type here");
+            let message = format!(
+                "no object that `{word}` can be bound to has the type required \
+                                   here"
+            );
             Err((message, None))
         }
     }
@@ -302,8 +305,8 @@ impl Reader<'_> {
             }
         };
         if !can_fail && !likelihoods.defaults.failing.has_failures() {
-            let message = "this says what failures leave behind, but not that an action fails \
-                           after its start";
+            let message = "effects of failures without a probability that the action fails after \
+                           its start";
             let expected = "`end`: how likely its end is to succeed".to_owned();
             self.mistakes.mistake(span, message, expected);
         }

@@ -65,7 +65,7 @@ impl Structure<'_> {
             if !matches!(self.atoms[atom], Atom::Literal(_))
                 && names.insert(self.name(atom), atom).is_some()
             {
-                return Err(NoPlanFlaw::Unknown("an action that is running twice"));
+                return Err(NoPlanFlaw::Unknown("an action with two running instances"));
             }
         }
         let atom = |name: &String| {

@@ -169,7 +169,7 @@ fn slack(
             best: Some(best), ..
         } => Value::Slack(best.value),
         EnvelopeFinding::Envelope { .. } => {
-            Value::Unknown("nothing in the plan may deviate".to_owned())
+            Value::Unknown("no quantity of the plan may deviate".to_owned())
         }
         _ => Value::Unknown("the plan has no envelope".to_owned()),
     })

@@ -171,7 +171,7 @@ impl StateView<'_> {
             if now.value.as_constant().is_some_and(Rational::is_zero) {
                 let rate = rate.ok_or_else(|| Refusal::Nature {
                     place: self.reading.location.to_owned(),
-                    obstacle: "in which direction a number leaves the bound of a condition \
+                    obstacle: "the direction in which a number leaves the bound of a condition \
                                depends on parameters"
                         .to_owned(),
                 })?;

@@ -173,15 +173,15 @@ impl<'a> Phase<'a> {
             self.execute_current_events()?;
             if self.occurred.len() > before {
                 return Err(self.obstacle(
-                    "an event falls together with the next happening, as planned: their order is \
-                     not known",
+                    "an event coincides with the next happening in the nominal schedule: their \
+                     order is unknown",
                 ));
             }
             return Ok(());
         }
         Err(self.obstacle(&format!(
-            "there are more than {MAX_TRANSITIONS} events and turns of processes before the next \
-             happening"
+            "there are more than {MAX_TRANSITIONS} events and starts or stops of processes before \
+             the next happening"
         )))
     }
 
@@ -274,8 +274,8 @@ impl<'a> Phase<'a> {
     fn require_nominal(&mut self, course: &str, broken: Alternatives) -> Result<(), Refusal> {
         if self.holds_nominally(&broken) {
             return Err(self.obstacle(
-                "as planned, things fall together whose order is not known then: happenings, \
-                 events, or processes that start or stop",
+                "happenings, events, or starts or stops of processes coincide in the nominal \
+                 schedule: their order is unknown",
             ));
         }
         self.require(course, broken);
@@ -318,7 +318,10 @@ impl<'a> Phase<'a> {
             is_strict: !is_later,
         };
         let words = (self.compiler.plan.plan).describe_node(self.compiler.task, next);
-        let course = format!("{words} must come after what happens before it as planned");
+        let course = format!(
+            "{words} must come after the events that precede it in the nominal \
+                              schedule"
+        );
         self.require_nominal(&course, vec![vec![broken]])
     }
 
@@ -357,13 +360,13 @@ fn time_of(node: NodeId) -> Linear {
 fn event_label(event: &GroundEvent, happens: bool) -> String {
     let name = &event.name;
     if happens {
-        format!("the event {name} must happen as planned")
+        format!("the event {name} must happen as in the nominal schedule")
     } else {
         format!("the event {name} must not happen before the next happening")
     }
 }
 
 fn process_label(process: &str, is_at_work: bool) -> String {
-    let is = if is_at_work { "at work" } else { "at rest" };
+    let is = if is_at_work { "active" } else { "inactive" };
     format!("the process {process} must be {is} until the next happening")
 }

@@ -71,7 +71,7 @@ impl Phase<'_> {
                 return Ok(());
             }
             if !tried.insert(std::mem::replace(&mut on, then)) {
-                return Err(self.obstacle("a process would start and stop without end"));
+                return Err(self.obstacle("a process would start and stop infinitely often"));
             }
         }
     }

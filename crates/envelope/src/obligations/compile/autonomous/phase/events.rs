@@ -23,13 +23,13 @@ impl Phase<'_> {
         for (position, &event) in ready.iter().enumerate() {
             let name = &events[event].name;
             if !self.fired.insert(event) {
-                return Err(self.obstacle(&format!("the event {name} happens without end")));
+                return Err(self.obstacle(&format!("the event {name} happens infinitely often")));
             }
             let own = &self.autonomous.footprints[event];
             let mut others = ready[..position].iter();
             if others.any(|other| own.interferes_with(&self.autonomous.footprints[*other])) {
                 return Err(self.obstacle(&format!(
-                    "the event {name} happens together with another one that it interferes with"
+                    "the event {name} happens together with another event, and they interfere"
                 )));
             }
             self.require_single_occurrence(event);
@@ -55,7 +55,8 @@ impl Phase<'_> {
             let holds = self
                 .view(&self.now)
                 .holds(guard, ReadTime::At(&Rational::ZERO))?;
-            let course = "whether a conditional effect of an event comes about must not change";
+            let course = "the condition of a conditional effect of an event must keep its truth \
+                          value";
             self.require_now(guard, holds, course)?;
             if !holds {
                 continue;

@@ -66,20 +66,26 @@ impl Phase<'_> {
                 }
                 let Some(later) = later else {
                     return Err(self.obstacle(
-                        "how fast a number reaches the bound of a condition depends on parameters",
+                        "the rate at which a number reaches the bound of a condition depends on \
+                         parameters",
                     ));
                 };
                 let moment = self.at.plus(&later);
                 if found.as_ref().is_some_and(|other| *other != moment) {
                     return Err(self.obstacle(
-                        "two numbers reach bounds at one moment, as planned, and need not do so \
-                         at other times: their order is not known",
+                        "two numbers reach bounds at the same time in the nominal schedule, but \
+                         not in all schedules: their order is unknown",
                     ));
                 }
                 found = Some(moment);
             }
         }
-        found.ok_or_else(|| self.obstacle("the moment of an event or of a process is not known"))
+        found.ok_or_else(|| {
+            self.obstacle(
+                "the time of an event, or of a start or stop of a \
+                                           process, is unknown",
+            )
+        })
     }
 }
 
