@@ -193,7 +193,7 @@ fn run_ends_with_unresolvable_doubt_as_reason() {
         };
         assert!(why.contains("so in doubt: (in x)"), "{executor}: {why}");
         assert!(
-            why.contains("whether (pick r1 x) has come to its end"),
+            why.contains("whether (pick r1 x) has ended"),
             "{executor}: {why}"
         );
         let refused = report
