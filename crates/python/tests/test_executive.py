@@ -126,7 +126,7 @@ def test_goal_is_not_achieved_before_its_release_time() -> None:
         (HOME, {"deadline": 900, "within": 5}, "leave out one"),
         (HOME, {"after": 0}, "not positive"),
         (HOME, {"release": 900, "within": 5}, "give both"),
-        (HOME, {"by": ""}, "no name of a client"),
+        (HOME, {"by": ""}, "invalid name of a client"),
     ],
 )
 def test_wrong_goals_are_refused(goal: str, options: dict[str, Any], words: str) -> None:

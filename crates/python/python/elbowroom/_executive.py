@@ -221,7 +221,7 @@ class Executive(BackgroundRun):
         """Cancels an open goal.
 
         Raises:
-            RequestError: if no goal of that name is open.
+            RequestError: if there is no open goal with this name.
         """
         self._check(self._native.cancel_goal(goal, self._patience()))
 
