@@ -162,7 +162,7 @@ pub const METHODS: &[Method] = &[
     change(
         "POST",
         "/v1/pause",
-        "Nothing more is started; running actions continue",
+        "No further actions are started; running actions continue",
         None,
     ),
     change("POST", "/v1/resume", "The end of a pause", None),

@@ -273,7 +273,7 @@ impl ApiRouter {
                 self.allow(request)?;
                 self.change("POST", &format!("/v1{path}"), b"")?;
                 let words = match path {
-                    "/pause" => "Nothing more is started; running actions continue.\n",
+                    "/pause" => "No further actions are started; running actions continue.\n",
                     _ => "The executive continues.\n",
                 };
                 respond(stream, 202, TEXT, words)

@@ -149,7 +149,7 @@ test("an executive or a world that is stopped or killed is shown within three se
   process.kill(world, "SIGSTOP");
   await shows(tab, "warning-list", "the world has not answered for ", 3000);
   const [, words] = (await control(address, "state")).split("\n");
-  assert.match(words, /the world has not answered for [0-9]+ s: nothing is started/);
+  assert.match(words, /the world has not answered for [0-9]+ s: until it does, no action is started/);
   process.kill(world, "SIGCONT");
   await tab.waitForFunction(() => document.getElementById("warnings").hidden, null, { timeout: 20_000 });
   own.child.kill("SIGKILL");
