@@ -391,7 +391,7 @@ fn misspelt_planner_is_not_suggested_for_installation() {
 #[test]
 fn file_that_is_no_trace_is_reported() {
     let said = refusal(&["run", "--replay", "cases/delivery/plan.plan"]);
-    assert!(said.contains("no trace of a run"), "{said}");
+    assert!(said.contains("not the trace of a run"), "{said}");
 }
 
 #[test]
