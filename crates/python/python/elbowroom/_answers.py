@@ -467,7 +467,7 @@ class Run(Table):
         return [document(line) for line in self.trace_text.splitlines()]
 
     def rows(self) -> list[Execution]:
-        """What was done."""
+        """Executed actions."""
         return [
             Execution(*(it.get(field) for field in Execution._fields))
             for it in self.document["executed"]
