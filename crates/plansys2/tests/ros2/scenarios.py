@@ -185,7 +185,7 @@ def a_failure_has_its_reason(stage):
 def a_performer_is_lost(stage):
     crew = {**DRIVERS, "driver1": dict(DRIVERS["driver1"], dies=0.5)}
     stage.play(crew, YARD)
-    assert stage.code == 1 and "driver1 is lost: nothing was heard of it for 5 s" in stage.trace()
+    assert stage.code == 1 and "driver1 is lost: no message from it for 5 s" in stage.trace()
 
 
 def a_performer_never_says_that_it_has_ended(stage):
@@ -220,7 +220,7 @@ def the_protocol_is_kept(stage):
 def a_missing_performer_is_named(stage):
     stage.world += " --needs move,signal --within 8"
     stage.play({"driver": {"action": "move", "lasts": 1}}, YARD)
-    assert stage.code == 2 and "no performer of signal was heard within 8 s; heard: driver (move)" in stage.errors
+    assert stage.code == 2 and "no performer of signal was discovered within 8 s; discovered: driver (move)" in stage.errors
     assert stage.log() == []
 
 
@@ -374,7 +374,7 @@ def what_others_tell_the_problem_expert_is_heeded(stage):
 def what_the_problem_expert_refuses_is_said_and_the_run_goes_on(stage):
     said = serve(stage, DRIVERS, expert=begin_expert(stage, refuses="at r1 gate"))
     assert said["executed"]["outcome"] == "succeeded" and len(said["executed"]["actions"]) == 3
-    assert "the problem expert does not take (at r1 gate): it is not valid" in stage.program
+    assert "the problem expert rejects (at r1 gate): it is not valid" in stage.program
     assert said["known"][0] == ["at r2 gate", "signalled gate"]
 
 
