@@ -128,7 +128,7 @@ pub struct ExecutorSpec {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum UnknownExecutor {
     /// The name is not in the list.
-    #[error("there is no executor `{name}`; choose one of {known}")]
+    #[error("unknown executor `{name}`; choose one of {known}")]
     Name {
         /// The name that was asked for.
         name: String,

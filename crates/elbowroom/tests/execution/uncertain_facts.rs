@@ -191,7 +191,10 @@ fn run_ends_with_unresolvable_doubt_as_reason() {
         let Verdict::NoPlan { why, .. } = &report.verdict else {
             panic!("{executor}: {report:#?}");
         };
-        assert!(why.contains("therefore in doubt: (in x)"), "{executor}: {why}");
+        assert!(
+            why.contains("therefore in doubt: (in x)"),
+            "{executor}: {why}"
+        );
         assert!(
             why.contains("whether (pick r1 x) has ended"),
             "{executor}: {why}"
