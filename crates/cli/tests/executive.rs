@@ -303,7 +303,7 @@ fn unauthorized_or_invalid_requests_get_a_clear_error() {
             Some(TOKEN),
             "{".to_owned(),
             422,
-            "the body cannot be read",
+            "cannot parse the body",
         ),
         (
             "POST",

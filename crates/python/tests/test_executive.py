@@ -157,7 +157,7 @@ def test_unknown_names_are_refused() -> None:
     ("options", "words"),
     [
         ({"executor": "live:5"}, "must know how the world behaves"),
-        ({"learn": "experience"}, "the run has none"),
+        ({"learn": "experience"}, "the run has no journal"),
         ({"executor": "nobody"}, "nobody"),
         ({"planner": lambda domain, problem: None}, "planner"),
         ({"planning_time": 1}, "planning"),

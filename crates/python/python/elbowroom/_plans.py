@@ -50,5 +50,5 @@ class Plans(Iterator[Plan]):
 def _late(last: Plan | None) -> Plan | NoPlan:
     if last is not None:
         return Plan(str(last), last.steps, {**last.document, "stop": "time limit"})
-    reason = "no plan found: stopped at the time limit; this is no proof that there is none"
+    reason = "no plan found: stopped at the time limit; this does not prove that none exists"
     return NoPlan({"answer": "none", "reason": reason, "stop": "time limit"})
