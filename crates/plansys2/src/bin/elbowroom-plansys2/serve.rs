@@ -217,7 +217,7 @@ impl Server {
                 }
             }
             Ok(Some(Command::Stop) | None) => {}
-            Err(error) => warn(&format!("not understood: {line}: {error}")),
+            Err(error) => warn(&format!("cannot parse: {line}: {error}")),
         }
     }
 

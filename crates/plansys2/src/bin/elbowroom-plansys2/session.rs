@@ -142,7 +142,7 @@ impl Session {
                     }
                     Ok(Some(Command::Stop)) => return true,
                     Ok(None) => {}
-                    Err(error) => warn(&format!("not understood: {line}: {error}")),
+                    Err(error) => warn(&format!("cannot parse: {line}: {error}")),
                 }
             }
             Input::Closed => return true,
