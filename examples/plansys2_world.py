@@ -106,7 +106,7 @@ class Hub:
             elif message.type == FINISH:
                 del self._deals[deal.key]
                 if not message.success:
-                    deal.action.failed(message.status or f"{node} has not said why")
+                    deal.action.failed(message.status or f"{node} gave no reason")
                 elif deal.action.duration is None:
                     deal.action.started()
                 else:
@@ -131,7 +131,7 @@ class Hub:
                 else:
                     deal.idle = now if deal.idle is None else deal.idle
                     if now - deal.idle >= IDLE_AFTER:
-                        self._lose(deal, f"{deal.performer} does nothing, and has not said how this has ended")
+                        self._lose(deal, f"{deal.performer} is idle, and has not reported the outcome")
 
     def performers(self):
         """Those that were heard of lately, each with the action that it performs: `robot1 (move)`."""
@@ -148,7 +148,7 @@ class Hub:
                 if deal.performer is None:
                     if now - deal.since > GIVE_UP_ASKING:
                         others = ", ".join(self.performers()) or "none"
-                        why = f"no performer answered within {GIVE_UP_ASKING:g} s; performers that were heard: {others}"
+                        why = f"no performer answered within {GIVE_UP_ASKING:g} s; discovered performers: {others}"
                         self._lose(deal, why)
                     elif deal.asked is None or now - deal.asked >= ASK_EVERY:
                         deal.asked = now
@@ -156,7 +156,7 @@ class Hub:
                     continue
                 heard, _ = self._heard.get(deal.performer, (None, ""))
                 if heard is not None and now - max(heard, deal.since) > LOST_AFTER:
-                    self._lose(deal, f"{deal.performer} is lost: nothing was heard of it for {LOST_AFTER:g} s")
+                    self._lose(deal, f"{deal.performer} is lost: no message from it for {LOST_AFTER:g} s")
 
     def _lose(self, deal, why):
         del self._deals[deal.key]
@@ -200,7 +200,7 @@ def main():
         time.sleep(0.1)
     # Each performer publishes its status once per second.
     time.sleep(1.2)
-    print(f"performers: {', '.join(hub.performers()) or 'none has been heard'}", file=sys.stderr)
+    print(f"performers: {', '.join(hub.performers()) or 'none'}", file=sys.stderr)
 
     world = World("plansys2", speed=float(os.environ.get("ELBOWROOM_SPEED", "1")))
     world.starter("*")(hub.begin)

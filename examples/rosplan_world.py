@@ -74,7 +74,7 @@ class Dispatcher:
         del self._actions[message.action_id]
         if what == "failed":
             said = ", ".join(f"{it.key}: {it.value}" for it in message.information)
-            action.failed(said or "the action interface has not said why")
+            action.failed(said or "the action interface gave no reason")
         elif action.duration is None:
             action.started()
         else:

@@ -115,7 +115,7 @@ class Performers(unittest.TestCase):
         self.after(20, alive=RUNNING)
         self.assertEqual(action.told, ["started"])
         self.after(6)
-        self.assertEqual(action.told[1:], ["failed: robot1 is lost: nothing was heard of it for 5 s"])
+        self.assertEqual(action.told[1:], ["failed: robot1 is lost: no message from it for 5 s"])
         self.assertEqual(self.kinds()[-1], (CANCEL, "robot1"))
         self.says(FINISH, success=True)
         self.assertEqual(len(action.told), 2)
@@ -128,7 +128,7 @@ class Performers(unittest.TestCase):
         self.after(3, alive=READY)
         self.assertEqual(action.told, ["started"])
         self.after(1, alive=READY)
-        self.assertEqual(action.told[1:], ["failed: robot1 does nothing, and has not said how this has ended"])
+        self.assertEqual(action.told[1:], ["failed: robot1 is idle, and has not reported the outcome"])
         self.assertEqual(self.kinds()[-1], (CANCEL, "robot1"))
 
     def test_a_failure_has_its_reason(self):

@@ -1,15 +1,16 @@
-"""The default executor beside the baselines, in worlds of many kinds.
+"""Comparison of the default executor with the baselines, in worlds of many kinds.
 
     python3 testing/default_executor.py PROGRAM FOLDER [--trials 100] [--seconds S] [--only TEXT] [--jobs N]
                                         [--data ../shared/data] [--executors live,esterel,stn]
 
-The first executor is the one in question. Each world is a domain, a problem and, for most, a plan with which every
-executor begins; the durations vary by 1, 10 and 30 percent, with and without failures of one start in ten. All
-executors meet the same seeds. Each world is one experiment of `elbowroom compare`, and its results stay in FOLDER:
-a second call continues where the first ended. At the end a table is printed and written to FOLDER/table.md: of each
-world, how many runs reached the goal, and the paired difference to each baseline with its standard error.
+The first executor is compared with the others. Each world is a domain, a problem and, for most, a plan with which every
+executor begins. Durations vary by 1, 10 and 30 percent, with and without failures of one start in ten. All executors use
+the same random seeds. Each world is one experiment of `elbowroom compare`. Its results are kept in FOLDER, and a second
+call continues where the first ended. At the end a table is printed and written to FOLDER/table.md. For each world, it has
+the number of runs that reached the goal, and the paired difference to each baseline with its standard error.
 
-Exit code 1: the first executor is below a baseline by three standard errors, in some world or over all worlds. Standard library only; what is under `--data` is left out where the folder is absent.
+Exit code 1: the first executor is below a baseline by three standard errors, in some world or over all worlds. Standard
+library only. Without the folder `--data`, its worlds are omitted.
 """
 
 import argparse
@@ -30,7 +31,7 @@ DEVIATIONS = (1, 10, 30)
 
 
 def within(jobs, length, job, name, one_hand=True):
-    """`jobs` pieces of work that must lie within something that runs: a torch, a pump."""
+    """`jobs` actions that must lie within another running action, such as a torch or a pump."""
     hand = "(at start (hand)) " if one_hand else ""
     takes = "(at start (not (hand))) (at end (hand)) " if one_hand else ""
     domain = f"""(define (domain {name}) (:requirements :typing :durative-actions)
@@ -51,7 +52,7 @@ def within(jobs, length, job, name, one_hand=True):
 
 
 def window(jobs, job, opens, closes, name):
-    """Work that has to be done while a place is open."""
+    """Actions that must lie within the opening times of a place."""
     domain = f"""(define (domain {name}) (:requirements :typing :durative-actions :timed-initial-literals)
   (:types job) (:predicates (open) (hand) (done ?j - job))
   (:durative-action work :parameters (?j - job) :duration (= ?duration {job})
@@ -68,7 +69,7 @@ def window(jobs, job, opens, closes, name):
 
 
 def recharge(needed, planned, least, most, deadline, name):
-    """A recharge of open duration before a drive that needs the charge; a deadline for the whole."""
+    """A recharge of open duration before a drive that needs the charge, with a deadline for both."""
     domain = f"""(define (domain {name})
   (:requirements :durative-actions :numeric-fluents :duration-inequalities :timed-initial-literals)
   (:predicates (free) (there) (in-time) (home)) (:functions (charge))
@@ -255,7 +256,7 @@ def write_experiment(folder, world, executors, trials):
 
 
 def run(program, experiment, jobs, seconds):
-    """Runs one experiment; returns why there are no results, or None."""
+    """Runs one experiment; returns the reason for missing results, or None."""
     folder = experiment.parent / "results"
     command = [program, "compare", str(experiment), "--jobs", str(jobs), "--each-trial", "-o", str(folder)]
     begun = time.monotonic()
@@ -270,7 +271,7 @@ def run(program, experiment, jobs, seconds):
         except subprocess.TimeoutExpired:
             process.kill()
             _, errors = process.communicate()
-            errors = "killed: it did not obey the interrupt within 60 s"
+            errors = "killed: it ignored the interrupt for 60 s"
     (experiment.parent / "seconds").write_text(f"{time.monotonic() - begun:.1f}\n", encoding="utf-8")
     if (folder / "trials.csv").exists():
         return None
@@ -278,7 +279,7 @@ def run(program, experiment, jobs, seconds):
 
 
 def trials_of(folder):
-    """Returns {column: {seed: {executor: whether the goal was reached}}}."""
+    """Returns {column: {seed: {executor: True if the goal was reached}}}."""
     columns = {}
     with (folder / "results" / "trials.csv").open(encoding="utf-8") as file:
         for row in csv.DictReader(file):
@@ -331,8 +332,8 @@ def main():
     parser.add_argument("program")
     parser.add_argument("folder", type=pathlib.Path)
     parser.add_argument("--trials", type=int, default=100, help="seeds in each world, with each deviation")
-    parser.add_argument("--seconds", type=float, default=None, help="how long all takes at most")
-    parser.add_argument("--each", type=float, default=600, help="how many seconds one world takes at most")
+    parser.add_argument("--seconds", type=float, default=None, help="time limit for all worlds, in seconds")
+    parser.add_argument("--each", type=float, default=600, help="time limit for each world, in seconds")
     parser.add_argument("--only", default="", help="worlds with this text in their names")
     parser.add_argument("--jobs", type=int, default=1)
     root = pathlib.Path(__file__).resolve().parent.parent

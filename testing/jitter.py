@@ -1,19 +1,19 @@
-"""How late actions are started on a wall clock: 100 robots, 10,000 actions.
+"""Delays of action starts on a wall clock: 100 robots, 10,000 actions.
 
     python3 testing/jitter.py target/release/elbowroom [--load N] [--pace 10] [--journal] [EXECUTOR…]
 
-Each robot drives from place to place, a hundred times, and each tenth time waits for a dock that others use, too.
-Durations deviate. The world is a process, this file once more, whose clock runs PACE times as fast as the one on
-the wall; meanwhile N other processes do nothing but calculate. How late a start is, is the time on the wall from
-the earliest moment at which it could be, as the trace has it, to the one at which the world has read that it is
-to start. With --journal, nothing is started that is not on the disk. Standard library only.
+Each robot drives from place to place a hundred times, and every tenth time waits for a dock that is shared with other
+robots. Durations deviate. The world is a process that runs this file, with a clock that is PACE times as fast as the wall
+clock. Meanwhile N other processes use the processor. The delay of a start is the wall-clock time from its earliest
+possible time, according to the trace, to the time at which the world has read the command. With --journal, each start is
+on disk before its command. Standard library only.
 
     python3 testing/jitter.py target/release/elbowroom --replan [--load N] [--robots 100] [EXECUTOR…]
 
-The same with an executive that is given two goals while the robots are under way: one that the rest of the
-running plan reaches, if it can be kept, and one for which a plan is made. How late starts and answers are is printed
-for the time before, from the one goal until its plan is taken up, from the other goal until the planner has answered
-and until its plan is taken up, and after that.
+The same with an executive that receives two goals while the robots are working: one that the rest of the running plan
+reaches, if it can be kept, and one that needs a new plan. The delays of starts and answers are printed separately for five
+phases: before the first goal, until its plan is adopted, after the second goal until the planner has answered, until its
+plan is adopted, and afterwards.
 """
 
 import argparse
@@ -36,7 +36,7 @@ DOCKS = 20
 
 
 def world(pace, log):
-    """The world: what it is told to start lasts about as long as planned. Arrivals are noted in a file."""
+    """The world: durations are close to the planned ones. Arrival times of commands are written to a file."""
     dice = random.Random(1)
     begin = None
     running, news, arrivals = [], [], []
@@ -73,14 +73,14 @@ def world(pace, log):
 
 
 def calculate():
-    """What another program does."""
+    """Load: a program that only computes."""
     number = 0
     while True:
         number = (number * 1103515245 + 12345) % 2**31
 
 
 def lateness(trace, log, pace):
-    """Of each start in the trace, in milliseconds of the wall clock."""
+    """Delay of each start in the trace, in milliseconds of the wall clock."""
     arrivals = dict(json.loads(log.read_text()))
     late = []
     for text in trace.read_text().splitlines():
@@ -97,7 +97,7 @@ TOKEN = "of-one-measurement-only"
 
 
 class Executive:
-    """The program as an executive, and a client that asks all the time."""
+    """The program as an executive, with a client that sends requests continuously."""
 
     def __init__(self, line, folder):
         (folder / "token").write_text(TOKEN)
@@ -126,7 +126,7 @@ class Executive:
         return answer
 
     def ask_on(self):
-        """Tells it what it believes: the answer comes when the run has taken it in."""
+        """Reports a fact that is already believed; the answer follows when the run has processed it."""
         while not self.is_over:
             begin, phase = time.monotonic(), self.phase
             taken = self.ask("POST", "/v1/facts", {"fact": "(road p0 p1)", "becomes": True})
@@ -145,7 +145,7 @@ class Executive:
             time.sleep(0.02)
 
     def give(self, name, goal, phases):
-        """Gives a goal, and waits until a plan is taken up for it."""
+        """Gives a goal, and waits until a plan for it is adopted."""
         plans = self.plans()
         print(f"{name}: {goal}", file=sys.stderr)
         self.phase = phases[0]
@@ -163,7 +163,7 @@ PHASES = ["before", "first goal", "second goal: planning", "second goal: made re
 
 
 def phases_of(trace):
-    """From when to when each was, by the world's clock, and the starts: ticket and earliest time."""
+    """Returns the phases on the world's clock, and the starts: ticket and earliest time."""
     bounds, goals, starts = {}, 0, []
     for text in trace.read_text().splitlines():
         line = json.loads(text)
@@ -187,7 +187,7 @@ def phases_of(trace):
 
 
 def replanned(line, folder, pace):
-    """An executive that is given goals on the way: a row for each phase."""
+    """Measures an executive that receives goals during the run: a row for each phase."""
     executive = Executive(line, folder)
     executive.until(lambda: executive.plans() > 0)
     executive.client.start()

@@ -1,12 +1,12 @@
-"""How soon a plan is begun, and with how much memory, by the number of its time points.
+"""Time and memory until a plan is started, by the number of its time points.
 
     python3 testing/large_plans.py target/release/elbowroom [--executor stn] [--numbers | --shape NAME] [TIME POINTS…]
 
-*Begun* is when the trace has its first command, everything before that included: reading, judging, relaxing the
-plan, and making the network ready. *Run* is the whole process. With --numbers, conditions read numbers; with
---shape, robots limit each other in one of the ways of `shapes.py`. With --files, nothing is measured: domain, problem and
-plan are written to that folder, and a world in which each duration is up to a tenth longer or shorter than planned.
-Standard library only; memory is read from /proc.
+*Begun* is the time of the first command in the trace. It includes reading, validating and relaxing the plan, and preparing
+the network. *Run* is the whole process. With --numbers, conditions read numbers; with --shape, robots limit each other as
+in one of the shapes of `shapes.py`. With --files, nothing is measured: domain, problem and plan are written to that folder,
+and a world in which each duration is up to a tenth longer or shorter than planned. Standard library only; memory is read
+from /proc.
 """
 
 import argparse
@@ -26,13 +26,13 @@ COMMAND = b'"event":"command"'
 
 
 class Trace:
-    """What has been read of a trace; each byte is read once."""
+    """Incremental reader of a trace; each byte is read once."""
 
     def __init__(self, path):
         self.path, self.read, self.end = path, 0, b""
 
     def has_command(self):
-        """Whether a command is among what has come in since the last time."""
+        """Returns `True` if a command is among the lines since the last call."""
         if not self.path.exists():
             return False
         with self.path.open("rb") as file:
@@ -45,7 +45,7 @@ class Trace:
 
 
 def peak(process):
-    """What the process has held at most, in megabytes; `None` when it is over."""
+    """Peak memory of the process in megabytes; `None` after its end."""
     try:
         text = pathlib.Path(f"/proc/{process.pid}/status").read_text()
         (line,) = [line for line in text.splitlines() if line.startswith("VmHWM")]
@@ -55,7 +55,7 @@ def peak(process):
 
 
 def processor(process):
-    """The seconds of processor time so far, in the program's own code."""
+    """Processor time so far, user and system, in seconds."""
     words = pathlib.Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()
     return (int(words[11]) + int(words[12])) / os.sysconf("SC_CLK_TCK")
 
@@ -112,8 +112,8 @@ def main():
     parser.add_argument("points", nargs="*", type=int, default=[1_000, 10_000, 40_000, 100_000])
     parser.add_argument("--executor", default="stn")
     parser.add_argument("--patience", type=float, default=300)
-    parser.add_argument("--numbers", action="store_true", help="driving takes charge")
-    parser.add_argument("--shape", choices=shapes.SHAPES, help="how robots limit each other")
+    parser.add_argument("--numbers", action="store_true", help="driving uses charge")
+    parser.add_argument("--shape", choices=shapes.SHAPES, help="kind of constraints between robots")
     parser.add_argument("--files", type=pathlib.Path, help="write files for the first number of time points")
     chosen = parser.parse_intermixed_args()
     if chosen.files:

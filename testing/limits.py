@@ -1,12 +1,11 @@
-"""How far `elbowroom plan` overshoots a time limit, on many problems.
+"""Distribution of the time by which `elbowroom plan` exceeds a time limit, on many problems.
 
     python3 testing/limits.py target/release/elbowroom FOLDER… [--limit 1] [--only TEXT]… [-o FILE.csv]
 
-plans for each problem that the `manifest.csv` of a folder names (its first line names the columns: `domain`,
-`instance`, `domain_file`, `problem_file`, and perhaps `collection`), one after the other. `--only` keeps lines of
-manifests that contain one of the texts. Each run becomes a line: domain, instance, exit code, seconds by the clock,
-seconds of the processor. In the end it prints how the overshoots are distributed. A file that has lines already is
-added to. Standard library only.
+plans sequentially for each problem in the `manifest.csv` of a folder. Its first line names the columns: `domain`,
+`instance`, `domain_file`, `problem_file`, and optionally `collection`. `--only` selects the lines that contain one of the
+texts. Each run adds a line: domain, instance, exit code, wall-clock seconds, processor seconds. At the end the distribution
+of the excess times is printed. Lines are appended to an existing file. Standard library only.
 """
 
 import argparse
@@ -30,7 +29,7 @@ def problems(folders, only):
 
 
 def measured(command):
-    """Exit code, seconds by the clock, seconds of the processor."""
+    """Exit code, wall-clock seconds, processor seconds."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     begun = time.monotonic()
     code = subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False).returncode

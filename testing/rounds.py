@@ -1,7 +1,7 @@
-"""Robots on their rounds: a domain, a problem and a plan of any length, for measurements.
+"""Robots on rounds: a domain, a problem and a plan of any length, for measurements.
 
-Each robot drives from place to place, and each tenth time it is served at a dock that others use, too. With numbers,
-driving takes charge, which a robot gets back where it is served.
+Each robot drives from place to place, and every tenth time it is served at a dock that is shared with other robots. With
+numbers, driving uses charge, and the robot is recharged where it is served.
 """
 
 PLACES = 10
@@ -56,7 +56,7 @@ def problem(robots, docks, has_numbers=False):
 
 
 def plan(robots, docks, actions):
-    """So many actions, each as early as it can be; times are whole milliseconds."""
+    """A plan with this number of actions, each as early as possible; times are whole milliseconds."""
     free_at, place, dock_at = [0] * robots, [i % PLACES for i in range(robots)], [0] * docks
     steps = []
     for number in range(actions):

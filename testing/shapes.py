@@ -1,6 +1,6 @@
 """Plans of different shapes and of any length, for measurements: 20 robots that limit each other in one way.
 
-Each shape is a function of the number of actions, with the domain, the problem and the steps of a plan for it: start in
+Each shape is a function of the number of actions. It returns the domain, the problem and the steps of a plan: start in
 milliseconds, action, seconds.
 """
 
@@ -17,7 +17,7 @@ def action(name, conditions, effects, seconds=5):
 
 
 def texts(actions, facts, predicates="", functions="", goal=None):
-    """A domain and a problem in which each robot has something to do."""
+    """A domain and a problem with a task for each robot."""
     each = [f"(idle {robot})" for robot in ROBOTS]
     domain = (
         "(define (domain shape) (:requirements :typing :durative-actions :numeric-fluents :continuous-effects"
@@ -36,27 +36,27 @@ def texts(actions, facts, predicates="", functions="", goal=None):
 
 
 def in_turns(count, name, turn=5001):
-    """All robots at once, turn after turn; `name` says what a robot does in a turn."""
+    """All robots concurrently, turn after turn; `name` is the action of a robot in a turn."""
     turns = [divmod(number, len(ROBOTS)) for number in range(count)]
     return [(number * turn + 1, f"({name(number)} {ROBOTS[robot]})", 5) for number, robot in turns]
 
 
 def lock(count):
-    """One thing that all need, one after the other."""
+    """One resource that all robots use sequentially."""
     use = action("use", "(at start (free))", "(at start (not (free))) (at end (free))")
     steps = [(i * 5001 + 1, f"(use {ROBOTS[i % len(ROBOTS)]})", 5) for i in range(count)]
     return *texts([use], ["(free)"], predicates="(free)"), steps
 
 
 def counter(count):
-    """A number that all add to, and that is the goal."""
+    """A number that all robots increase, and that is the goal."""
     work = action("work", IDLE, f"{BUSY} {FREE} (at end (increase (count) 1))")
     domain, problem = texts([work], ["(= (count) 0)"], functions="(count)", goal=f"(>= (count) {count})")
     return domain, problem, in_turns(count, lambda _: "work")
 
 
 def pool(count):
-    """A number that all take from and give back to; half of them can work at a time."""
+    """A number that all robots decrease and restore; half of them can work at a time."""
     half = len(ROBOTS) // 2
     effects = f"{BUSY} {FREE} (at start (decrease (tools) 1)) (at end (increase (tools) 1))"
     work = action("work", f"{IDLE} (at start (>= (tools) 1))", effects)
@@ -69,7 +69,7 @@ def pool(count):
 
 
 def stock(count):
-    """A number that half of them add to, and the others take from."""
+    """A number that half of the robots increase and the others decrease."""
     make = action("make", IDLE, f"{BUSY} {FREE} (at end (increase (parts) 1))")
     use = action("use", f"{IDLE} (at start (>= (parts) 1))", f"{BUSY} {FREE} (at start (decrease (parts) 1))")
     steps = []
@@ -83,7 +83,7 @@ def stock(count):
 
 
 def match(count):
-    """Required concurrency: something is mended while a match burns."""
+    """Required concurrency: repairs while a match burns."""
     light = "(at start (light ?r)) (at end (not (light ?r)))"
     burn = action("burn", "(at start (dark ?r))", f"(at start (not (dark ?r))) (at end (dark ?r)) {light}", 8)
     mend = action("mend", f"{IDLE} (over all (light ?r))", f"{BUSY} {FREE}")
@@ -97,7 +97,7 @@ def match(count):
 
 
 def deadline(count):
-    """All has to be over by one time, a tenth later than planned."""
+    """One deadline for all actions, a tenth later than planned."""
     work = action("work", f"{IDLE} (over all (open))", f"{BUSY} {FREE}")
     end = (count // len(ROBOTS) + 1) * 5.5 + 50
     facts = ["(open)", f"(at {end} (not (open)))"]
@@ -118,7 +118,7 @@ def windows(count):
 
 
 def due(count):
-    """Each turn has to be over by a time of its own, which leaves a tenth more room with each."""
+    """A deadline for each turn; the slack increases by a tenth with each."""
     work = (
         "\n (:durative-action work :parameters (?r - robot ?t - turn) :duration (= ?duration 5)"
         f"\n  :condition (and {IDLE} (over all (open ?t)))\n  :effect (and {BUSY} {FREE} (at end (done ?r))))"

@@ -1,13 +1,13 @@
-"""An executive under way for a long time: 20 simulated robots, goals that come and go.
+"""An executive over a long time: 20 simulated robots, with goals that are added and cancelled.
 
     python3 testing/soak.py target/release/elbowroom [--seconds 3600] [--seed 1] [--robots 20]
 
-starts `elbowroom serve` on a wall clock that is ten times as fast, with durations that deviate, actions that fail
-and jobs that come undone. Goals are given, some of them are cancelled, and there are pauses. Each minute it prints
-what the executive holds in memory, how long requests took, and how late actions were started. The trace is judged:
-a goal that is said to be reached is so in the world's own answer at that moment (a job may come undone before anybody
-can ask), no robot has two jobs at once, nothing is started twice, and what has happened leads to the same decisions
-when it is played back. Exit code 0: all of it was right. Standard library only; memory is read from /proc.
+starts `elbowroom serve` on a clock ten times as fast as the wall clock, with durations that deviate, actions that fail
+and jobs that become undone by themselves. Goals are given, some of them are cancelled, and there are pauses. Each minute
+the memory of the executive, the response times and the delays of starts are printed. The trace is checked: a goal reported
+as reached holds in the world's own answer at that time (a job may become undone before the next request), no robot has two
+jobs at the same time, nothing is started twice, and the replay makes the same decisions. Exit code 0: no errors. Standard
+library only; memory is read from /proc.
 """
 
 import argparse
@@ -62,7 +62,7 @@ def problem(robots, jobs):
 
 
 class Executive:
-    """The program, and what is asked of it."""
+    """The program and its requests."""
 
     def __init__(self, program, folder, robots, jobs):
         texts = {"domain.pddl": DOMAIN, "problem.pddl": problem(robots, jobs), "world.toml": WORLD}
@@ -88,7 +88,7 @@ class Executive:
         self.latencies = []
 
     def ask(self, verb, path, body=None):
-        """Status and answer; how long it took is noted."""
+        """Sends a request; returns status and answer, and records the response time."""
         begin = time.monotonic()
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=60)
         headers = {"Authorization": f"Bearer {TOKEN}"}
@@ -100,7 +100,7 @@ class Executive:
         return response.status, answer
 
     def memory(self):
-        """What it holds, in megabytes."""
+        """Memory of the process, in megabytes."""
         text = pathlib.Path(f"/proc/{self.process.pid}/status").read_text()
         (line,) = [line for line in text.splitlines() if line.startswith("VmRSS")]
         return int(line.split()[1]) / 1024
@@ -118,7 +118,7 @@ def decimal(number):
 
 
 class Trace:
-    """The lines of the trace so far, and what is wrong with them."""
+    """The lines of the trace so far, and their errors."""
 
     def __init__(self, path):
         self.file = open(path, encoding="utf-8")
@@ -168,7 +168,7 @@ class Trace:
             for name in line["goals"]:
                 wanted = self.goals.get(name, "(done start)")
                 if at != decimal(line["now"]) or wanted not in facts:
-                    self.wrong.append(f"{name} is said to be reached at {line['now']}, but not {wanted}")
+                    self.wrong.append(f"{name} is reported as reached at {line['now']}, but not {wanted}")
                 self.reached.add(name)
 
 
@@ -177,7 +177,7 @@ def facts_of(state):
 
 
 def step(own, dice, jobs, tally):
-    """Something is asked of the executive, at random; what it says is judged."""
+    """Sends a random request to the executive, and checks the answer."""
     status, state = own.ask("GET", "/v1/state")
     if status != 200:
         tally["wrong"].append(f"state: {status}")
@@ -259,16 +259,16 @@ def main():
         if code != 0:
             wrong.append(f"the executive ended with exit code {code}")
         if missing := sorted(tally["reached"] - trace.reached):
-            wrong.append(f"of {missing}, which are open no more, the trace does not say that they are reached")
+            wrong.append(f"{missing} are no longer open, but the trace does not report them as reached")
         if trace.starts == 0 or not tally["reached"]:
-            wrong.append("nothing was done")
+            wrong.append("no action was executed")
         replay = subprocess.run([chosen.program, "run", "--replay", own.trace], capture_output=True)
         if replay.returncode != 0:
-            wrong.append(f"the trace is not played back: {replay.stdout[-500:]}")
+            wrong.append(f"the replay of the trace failed: {replay.stdout[-500:]}")
         size = pathlib.Path(own.trace).stat().st_size / 1e6
         print(
             f"{trace.starts} starts, {tally['given']} goals given, {len(tally['reached'])} reached,"
-            f" {tally['cancelled']} cancelled; trace of {size:.1f} MB, played back; {len(wrong)} wrong"
+            f" {tally['cancelled']} cancelled; trace of {size:.1f} MB, replayed; {len(wrong)} errors"
         )
         for what in wrong[:20]:
             print(what)

@@ -1,11 +1,11 @@
-"""What Storm says of processes in the language of PRISM.
+"""Storm's results for processes in the language of PRISM.
 
     python testing/storm.py FILE... [--exact FILE...]
 
-prints a line of JSON for each file: its name, `value`, the greatest probability of reaching the label
-"goal" from the initial state, and the number of states. Markov decision processes are solved to 1e-11,
-by an algorithm that says how far off it may be, or, after --exact, in fractions: `fraction`. Storm's
-states of a game are solved here, by value iteration: stormpy has no solver for games.
+prints a line of JSON for each file: its name, `value`, the greatest probability of reaching the label "goal" from the
+initial state, and the number of states. Markov decision processes are solved to 1e-11 by an algorithm with a guaranteed
+error bound, or, after --exact, in fractions: `fraction`. Games are solved here by value iteration on Storm's states,
+because stormpy has no solver for games.
 """
 
 import json

@@ -3,7 +3,7 @@
     python testing/val_plans.py ELBOWROOM VALIDATE DATA RESULTS.csv [SECONDS]
 
 plans for each problem in the folder DATA with `ELBOWROOM plan --first`, at most SECONDS (4) of processor time each, writes
-the plan to a file, and has VAL's program VALIDATE judge it with `-t 0.001`. RESULTS.csv gets one row for each
+the plan to a file, and runs VAL's program VALIDATE on it with `-t 0.001`. RESULTS.csv gets one row for each
 problem; problems that it has already are skipped, so an interrupted measurement can be continued. The last lines
 count the rows and list those that VAL does not accept.
 
@@ -70,7 +70,7 @@ def call(words, seconds):
 
 
 def verdict(code, text):
-    """VAL's verdict, and the line that says why it is no other."""
+    """Returns VAL's verdict, and the line with the reason."""
     if "Plan valid" in text:
         return "valid", ""
     lines = [line.strip() for line in text.splitlines() if line.strip()]

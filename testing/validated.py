@@ -17,7 +17,7 @@ import tempfile
 
 
 def executions(command, experiment, trials, seconds):
-    """Returns the number of executions of an experiment, and what is wrong with them."""
+    """Returns the number of executions of an experiment, and their errors."""
     with tempfile.TemporaryDirectory() as folder:
         process = subprocess.Popen(
             [command, "compare", experiment, "--trials", str(trials), "--jobs", "1", "-o", folder],

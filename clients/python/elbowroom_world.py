@@ -208,7 +208,7 @@ class World:
 
     def _register(self, names: tuple[str, ...], kind: str, resumes: bool) -> Callable[[Does], Does]:
         if not names or not all(isinstance(name, str) for name in names):
-            raise TypeError('name the actions: @world.action("drive")')
+            raise TypeError('expected names of actions: @world.action("drive")')
 
         def register(function: Does) -> Does:
             for name in names:
@@ -284,7 +284,7 @@ class World:
             try:
                 message = json.loads(line)
             except ValueError:
-                print(f"{self.name}: not understood: {line.rstrip()}", file=sys.stderr)
+                print(f"{self.name}: cannot parse: {line.rstrip()}", file=sys.stderr)
                 continue
             if isinstance(message, dict):
                 self._inbox.put(("message", message))
@@ -573,7 +573,7 @@ class Simulation(World):
     def _launch(self, found: tuple[str, Does], action: Action) -> None:
         kind, function = found
         if kind != "lasts":
-            raise TypeError(f"a simulation has @world.lasts({action.name!r}), and no threads")
+            raise TypeError(f"a simulation runs no threads; use @world.lasts({action.name!r})")
         try:
             # Functions may multiply the planned duration even if there is none.
             is_instantaneous = action.duration is None
@@ -710,9 +710,9 @@ class _Ledger:
         is_said = False
         while not _locked(self._lock.fileno()):
             if is_over():
-                sys.exit(f"{self._path} belongs to another program, which has not ended")
+                sys.exit(f"{self._path} is in use by another program")
             if not is_said:
-                print(f"waiting for the program that has {self._path} to end", file=sys.stderr)
+                print(f"waiting for the end of the program that uses {self._path}", file=sys.stderr)
                 is_said = True
             _time.sleep(0.02)
 
@@ -745,7 +745,7 @@ class _Ledger:
         return lines
 
     def write(self, **line: Any) -> None:
-        assert self._file is not None, "a ledger begins with the greeting"
+        assert self._file is not None, "a ledger must begin with the greeting"
         self._file.write(json.dumps(line) + "\n")
         self._file.flush()
         os.fsync(self._file.fileno())

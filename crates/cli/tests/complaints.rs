@@ -442,11 +442,7 @@ fn a_plan_and_its_progress_can_be_seen_in_time() {
     let done = elbowroom(&["report", &trace, "-o", &page]);
     assert!(done.status.success(), "{done:?}");
     let text = fs::read_to_string(&page).expect("a page");
-    for words in [
-        "drive rover depot shelf",
-        "was due",
-        "What happened, and why",
-    ] {
+    for words in ["drive rover depot shelf", "was due", "Events and reasons"] {
         assert!(text.contains(words), "{words}");
     }
     let _ = (fs::remove_file(trace), fs::remove_file(page));

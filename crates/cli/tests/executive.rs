@@ -279,7 +279,7 @@ fn unauthorized_or_invalid_requests_get_a_clear_error() {
             None,
             goal.to_string(),
             401,
-            "takes the executive's token",
+            "needs the executive's token",
         ),
         (
             "POST",
@@ -287,7 +287,7 @@ fn unauthorized_or_invalid_requests_get_a_clear_error() {
             Some("wrong"),
             goal.to_string(),
             401,
-            "not the token",
+            "wrong token",
         ),
         (
             "POST",
@@ -295,7 +295,7 @@ fn unauthorized_or_invalid_requests_get_a_clear_error() {
             None,
             String::new(),
             401,
-            "takes the executive's token",
+            "needs the executive's token",
         ),
         (
             "POST",
@@ -303,7 +303,7 @@ fn unauthorized_or_invalid_requests_get_a_clear_error() {
             Some(TOKEN),
             "{".to_owned(),
             422,
-            "the body cannot be read",
+            "cannot parse the body",
         ),
         (
             "POST",
@@ -335,7 +335,7 @@ fn unauthorized_or_invalid_requests_get_a_clear_error() {
             Some(TOKEN),
             json!({"goal": "(done a1)", "name": "a/b"}).to_string(),
             422,
-            "no name for a goal",
+            "invalid name of a goal",
         ),
         (
             "POST",
@@ -351,7 +351,7 @@ fn unauthorized_or_invalid_requests_get_a_clear_error() {
             Some(TOKEN),
             String::new(),
             404,
-            "no goal of that name",
+            "there is no open goal with this name",
         ),
         (
             "POST",
@@ -391,7 +391,7 @@ fn unauthorized_or_invalid_requests_get_a_clear_error() {
             Some(TOKEN),
             "[]".to_owned(),
             422,
-            "is a list, not an object",
+            "expected an object, found a list",
         ),
         (
             "GET",
@@ -399,7 +399,7 @@ fn unauthorized_or_invalid_requests_get_a_clear_error() {
             None,
             String::new(),
             404,
-            "nothing at this path",
+            "unknown path",
         ),
         (
             "PUT",
@@ -407,7 +407,7 @@ fn unauthorized_or_invalid_requests_get_a_clear_error() {
             Some(TOKEN),
             String::new(),
             405,
-            "is not for PUT, but for GET",
+            "does not support PUT, but GET",
         ),
         (
             "GET",
@@ -415,7 +415,7 @@ fn unauthorized_or_invalid_requests_get_a_clear_error() {
             None,
             String::new(),
             405,
-            "is not for GET, but for POST",
+            "does not support GET, but POST",
         ),
         (
             "GET",
@@ -423,7 +423,7 @@ fn unauthorized_or_invalid_requests_get_a_clear_error() {
             None,
             String::new(),
             422,
-            "no number of a line",
+            "expected a line number in",
         ),
     ];
     for (verb, path, token, body, expected, words) in tests {

@@ -387,7 +387,7 @@ fn finished_journal_is_neither_overwritten_nor_resumed() {
     let text = String::from_utf8_lossy(&again.stderr).into_owned();
     assert_eq!(again.status.code(), Some(2), "{text}");
     assert!(
-        text.contains("there is a journal") && text.contains("--resume"),
+        text.contains("already exists") && text.contains("--resume"),
         "{text}"
     );
     let resumed = elbowroom(&["run", "--resume", &journal]);
@@ -414,7 +414,7 @@ fn finished_journal_is_neither_overwritten_nor_resumed() {
         (header.replace('\n', "\r\n"), "its first record is damaged"),
         (
             header[..60].to_owned(),
-            "remove it, and begin the run again",
+            "remove it, and start the run again",
         ),
     ] {
         fs::write(&journal, kept).expect("written");

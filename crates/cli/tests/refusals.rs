@@ -248,16 +248,16 @@ fn experiment(folder: &Path, changes: &[(&str, &str)]) -> String {
 fn experiments_without_meaningful_table_are_rejected() {
     let folder = folder("empty-experiments");
     let cases = [
-        ("trials = 6", "trials = 0", "make at least one trial"),
+        ("trials = 6", "trials = 0", "expected at least one trial"),
         (
             "executors = [\"guarded\", \"live\", \"fixed:10\"]",
             "executors = []",
-            "name at least one",
+            "at least one executor",
         ),
         (
             "[[column]]",
             "[blanks]\nfoo = []\n[[column]]",
-            "give the blank",
+            "at least one value for the blank",
         ),
         (
             "[[column]]",
@@ -267,7 +267,7 @@ fn experiments_without_meaningful_table_are_rejected() {
         (
             "trials = 6",
             "trials = 6\nplanner_time = 5",
-            "`planner_time` is for another",
+            "`planner_time` needs an external",
         ),
     ];
     for (from, to, words) in cases {
@@ -279,7 +279,7 @@ fn experiments_without_meaningful_table_are_rejected() {
     for (figures, words) in [
         (
             "executor = \"nobody\"\ncoverage = [1]",
-            "`nobody` is no row",
+            "unknown row `nobody`",
         ),
         (
             "executor = \"live\"\ncoverage = [1, 2]",
@@ -303,7 +303,7 @@ fn experiments_without_meaningful_table_are_rejected() {
     let is_list = |line: &&str| line.starts_with("executors =");
     let executors = text.lines().find(is_list).expect("executors");
     fs::write(&file, text.replace(executors, "executors = []")).expect("written");
-    assert!(refusal(&["compare", &file]).contains("nothing to make"));
+    assert!(refusal(&["compare", &file]).contains("the experiment is empty"));
     // A problem without placeholders is reported as such.
     let file = experiment(
         &folder,
@@ -344,7 +344,7 @@ fn only_results_of_the_experiment_are_merged_and_missing_parts_are_named() {
     assert_ne!(text, impossible);
     fs::write(&first, impossible).expect("written");
     let said = refusal(&["compare", &experiment(&folder, &[]), "--merge", &first]);
-    assert!(said.contains("no such parts"), "{said}");
+    assert!(said.contains("these parts do not exist"), "{said}");
     fs::remove_dir_all(folder).expect("it is there");
 }
 
@@ -391,7 +391,7 @@ fn misspelt_planner_is_not_suggested_for_installation() {
 #[test]
 fn file_that_is_no_trace_is_reported() {
     let said = refusal(&["run", "--replay", "cases/delivery/plan.plan"]);
-    assert!(said.contains("no trace of a run"), "{said}");
+    assert!(said.contains("not the trace of a run"), "{said}");
 }
 
 #[test]

@@ -128,7 +128,7 @@ pub struct ExecutorSpec {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum UnknownExecutor {
     /// The name is not in the list.
-    #[error("there is no executor `{name}`; choose one of {known}")]
+    #[error("unknown executor `{name}`; choose one of {known}")]
     Name {
         /// The name that was asked for.
         name: String,
@@ -224,11 +224,11 @@ impl FromStr for ExecutorSpec {
         };
         let argument = match (registered.argument, argument) {
             (None, None) => None,
-            (None, Some(_)) => return Err(wrong(format!("`{name}` takes no number"))),
+            (None, Some(_)) => return Err(wrong(format!("`{name}` does not accept a number"))),
             (Some(_), None) if registered.is_optional => None,
             (Some(meaning), None) => {
                 return Err(wrong(format!(
-                    "say which {meaning}, as in `{}`",
+                    "expected a {meaning}, as in `{}`",
                     registered.example()
                 )));
             }

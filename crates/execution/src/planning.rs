@@ -135,7 +135,8 @@ impl Lateness {
                 at(least)
             )),
             (Some(reached), Some(least)) => Some(format!(
-                "{} s late: the earliest plan found reaches it at {}, and it cannot be reached before {}",
+                "{} s late: the earliest plan found reaches it at {}, and no plan can reach it \
+                 before {}",
                 by(reached),
                 at(reached),
                 at(least)

@@ -51,7 +51,7 @@ pub enum PrepareError {
     #[error(transparent)]
     Parametrize(#[from] ParametrizeError),
     /// The plan is not guaranteed to work even if nothing deviates.
-    #[error("the plan is not guaranteed to work even if nothing deviates")]
+    #[error("the plan is not guaranteed to work even without deviations")]
     NoGuarantee,
     /// The analysis cannot decide about this plan: the reason.
     #[error("{0}")]

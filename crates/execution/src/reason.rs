@@ -213,7 +213,7 @@ impl fmt::Display for Reason {
         let behind = self.evidence.iter().map(ToString::to_string);
         let behind: Vec<String> = behind.filter(|it| about.as_ref() != Some(it)).collect();
         if !behind.is_empty() {
-            write!(f, " (behind it: {})", behind.join("; "))?;
+            write!(f, " (cause: {})", behind.join("; "))?;
         }
         Ok(())
     }
@@ -238,7 +238,7 @@ impl Reason {
             },
             Cause::Contradiction => format!("reports on {action} contradict each other"),
             Cause::Surprise => {
-                format!("{about} was not expected, and {action} needs it to be otherwise")
+                format!("{about} was not expected, and contradicts what {action} needs")
             }
             Cause::Silence => format!("{action} timed out"),
             Cause::GuaranteeLost => {
@@ -248,7 +248,7 @@ impl Reason {
                 Some(why) => format!("no order of the plan's actions can be chosen: {why}"),
                 None => "no order of the plan's actions leads to the goal from here".to_owned(),
             },
-            Cause::Likelier => format!("there is a likelier plan: {about}"),
+            Cause::Likelier => format!("another plan is more likely to succeed: {about}"),
             Cause::MoreSlack => {
                 "the guarantee has become weaker, and another plan is better".to_owned()
             }
@@ -264,8 +264,8 @@ impl Reason {
             Cause::NotTogether if known.is_some() => format!("{about} exclude each other"),
             Cause::TooLate => about.to_owned(),
             Cause::NotTogether => {
-                "each part of the goal could still become true if nothing were undone and there \
-                 were time, but no plan makes all of it true"
+                "each part of the goal is reachable if deletions and deadlines are ignored, but no \
+                 plan reaches all of them"
                     .to_owned()
             }
         }

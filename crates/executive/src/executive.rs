@@ -114,15 +114,15 @@ impl Executive {
         make_persistent(&mut spec);
         spec.check()?;
         if settings.learn.is_some() && settings.journal.is_none() {
-            let error = "a model is learnt from the journal, and the run has none";
+            let error = "a model is learnt from the journal, but the run has no journal";
             let advice = "name a journal, or leave out the folder of the model";
             return Err(RunError::Failed(Error::new(error, advice)));
         }
         let journal = match &settings.journal {
             Some(_) if spec.world_process.is_none() => {
                 return Err(RunError::Failed(Error::new(
-                    "a simulated world ends with the program, so that its run has no journal",
-                    "name a world process, give a world in this process, or leave out the journal",
+                    "a run in a simulated world cannot have a journal: the world ends with the program",
+                    "name a world process, pass a world object, or leave out the journal",
                 )));
             }
             Some(path) => {
@@ -206,10 +206,7 @@ impl Executive {
         check(&request, &self.checks)?;
         check_target(&request, &self.status, &self.queue)?;
         let number = self.queue.submit(vec![request]).ok_or_else(|| {
-            Error::new(
-                "too many requests wait for the executive",
-                "wait until it has processed some",
-            )
+            Error::new("too many requests are pending", "repeat the request later")
         })?;
         Ok(self.queue.wait_until_accepted(number, timeout))
     }
@@ -288,8 +285,12 @@ impl Executive {
     ) -> Result<JournaledOutcome, RunError> {
         let start = self.start.lock();
         let start = start.unwrap_or_else(PoisonError::into_inner).take();
-        let start = start
-            .ok_or_else(|| Error::new("the run was started before", "create another executive"))?;
+        let start = start.ok_or_else(|| {
+            Error::new(
+                "the run has already been started",
+                "create another executive",
+            )
+        })?;
         self.stop.install_for_thread();
         let outcome = self.execute(start, world);
         self.queue.close();

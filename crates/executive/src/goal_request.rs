@@ -83,29 +83,25 @@ impl GoalNames {
 fn check_times(given: &NewGoal, now: &Rational) -> Result<(), Error> {
     if given.keep && (given.deadline.is_some() || given.within.is_some()) {
         return Err(Error::new(
-            "a goal to keep has a deadline",
+            "a goal to keep cannot have a deadline",
             "leave out the deadline, or achieve the goal once",
         ));
     }
     let error = match (&given.deadline, &given.within, &given.release, &given.after) {
-        (Some(_), Some(_), ..) => {
-            "the goal has a deadline and a time within which it is to be achieved"
-        }
-        (.., Some(_), Some(_)) => {
-            "the goal has a release time and a time after which it is released"
-        }
+        (Some(_), Some(_), ..) => "the goal has both `deadline` and `within`",
+        (.., Some(_), Some(_)) => "the goal has both `release` and `after`",
         (Some(_), _, _, Some(_)) | (_, Some(_), Some(_), _) => {
-            let error = "one of the deadline and the release time counts from now";
+            let error = "of the deadline and the release time, only one is relative to now";
             return Err(Error::new(
                 error,
-                "give both by the world's clock, or both from now",
+                "give both on the world's clock, or both relative to now",
             ));
         }
         (Some(deadline), ..) if deadline.0 <= *now => {
             let late = (now - &deadline.0).to_decimal(3);
             return Err(Error::new(
                 format!(
-                    "the deadline has passed: it is {}, {late} s later",
+                    "the deadline has passed: the time is {}, {late} s later",
                     now.to_decimal(3)
                 ),
                 "give a later time, or the seconds from now (`within`)",

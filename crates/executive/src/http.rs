@@ -71,7 +71,7 @@ fn reject_foreign(request: &Request) -> Result<(), RequestError> {
     if request.header("upgrade").is_some() {
         return Err(RequestError::new(
             400,
-            "this is HTTP/1.1 alone; ask without the header `Upgrade`",
+            "only HTTP/1.1 is supported; send the request without the header `Upgrade`",
         ));
     }
     let host = request.header("host").unwrap_or_default();
@@ -87,7 +87,7 @@ fn reject_foreign(request: &Request) -> Result<(), RequestError> {
     if is_foreign || is_elsewhere && !is_visit {
         return Err(RequestError::new(
             403,
-            "a page from elsewhere may not ask this",
+            "requests from pages of other origins are not accepted",
         ));
     }
     Ok(())

@@ -28,8 +28,8 @@ const CHECKSUM_PREFIX_LENGTH: usize = 9;
 const INITIAL_CHECKSUM: &str = "00000000";
 
 /// Advice for a journal that is damaged in the middle.
-pub const DAMAGE_ADVICE: &str = "what comes behind the damage may not be all that happened: put a copy of the file in \
-                                  its place, or see to the robot and begin a new run with another journal";
+pub const DAMAGE_ADVICE: &str = "the records after the damage may be incomplete: restore the file from a copy, or \
+                                 check the state of the robot and start a new run with another journal";
 
 /// Journal file of a run, open for writing.
 pub struct JournalFile {
@@ -97,9 +97,9 @@ impl JournalFile {
         lock(path, &file)?;
         if file.metadata().is_ok_and(|it| it.is_file() && it.len() > 0) {
             return Err(Error::new(
-                format!("there is a journal {name} already"),
+                format!("the journal {name} already exists"),
                 format!(
-                    "`{resume}` continues its run; if that is over, choose another file, or remove this one"
+                    "`{resume}` resumes its run; if the run is over, choose another file, or remove this one"
                 ),
             ));
         }
@@ -225,7 +225,7 @@ fn lock(path: &Path, file: &File) -> Result<(), Error> {
 fn locked(path: &Path) -> Error {
     Error::new(
         format!("the run of {} has not ended", path.display()),
-        "another program writes this journal; wait for its end, or end it",
+        "another program is writing this journal; wait for its end, or stop it",
     )
 }
 
@@ -287,7 +287,7 @@ impl Journal {
                 }
                 Some((sum, line)) if before.is_some_and(|before| sum == checksum(before, line)) => {
                     return Err(format!(
-                        "it is damaged in the middle: record {} is whole, but one before it is not",
+                        "it is damaged: record {} is intact, but an earlier one is not",
                         index + 1
                     ));
                 }

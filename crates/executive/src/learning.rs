@@ -145,7 +145,7 @@ impl Learner {
                     domain: Some(domain),
                     ..
                 }) if own.as_ref().is_some_and(|own| *own != domain) => {
-                    format!("it is about the domain `{domain}`")
+                    format!("it belongs to the domain `{domain}`")
                 }
                 Ok(stored) => {
                     logs.push(stored.log);
@@ -153,7 +153,7 @@ impl Learner {
                 }
                 Err(why) => why,
             };
-            self.warn_once(format!("{} is left out: {why}", path.display()));
+            self.warn_once(format!("{} is ignored: {why}", path.display()));
         }
         Ok(logs)
     }
@@ -170,8 +170,8 @@ impl Learner {
         for (drift, what) in durations.into_iter().chain([failures]) {
             let Some(since) = drift.since else { continue };
             let text = format!(
-                "the {what} of `{}` have changed, noticed at number {since} of them: the model in {} mixes before and \
-                 after",
+                "the {what} of `{}` have changed, detected at sample {since}: the model in {} mixes samples from \
+                 before and after the change",
                 action.action,
                 self.folder.display()
             );

@@ -185,8 +185,7 @@ impl ProcessWorld {
         match self.send_within(message, self.time_limit()) {
             WriteResult::Written => Ok(()),
             WriteResult::Timeout => Err(WorldError::new(format!(
-                "it has not read what it was told within {} s; --answer-within says how long to \
-                 wait",
+                "it has not read its input within {} s; --answer-within sets the time limit",
                 self.answer_timeout.as_secs_f64()
             ))),
             WriteResult::Closed => Err(self.closed_pipe_error()),
@@ -243,8 +242,7 @@ impl ProcessWorld {
                 ReadResult::Timeout if left > POLL_INTERVAL => continue,
                 ReadResult::Timeout => {
                     return Err(WorldError::new(format!(
-                        "it has not ended its answer with `time` within {} s; --answer-within \
-                         says how long to wait{}",
+                        "it has not ended its answer with `time` within {} s; --answer-within sets the time limit{}",
                         timeout.as_secs_f64(),
                         invalid.unwrap_or_default()
                     )));
@@ -270,9 +268,9 @@ impl ProcessWorld {
                 Err(why) => {
                     let said = excerpt(line);
                     if self.limits.is_strict {
-                        return Err(WorldError::new(format!("it said `{said}`: {why}")));
+                        return Err(WorldError::new(format!("invalid message `{said}`: {why}")));
                     }
-                    invalid = Some(format!("; it said `{said}`: {why}"));
+                    invalid = Some(format!("; invalid message `{said}`: {why}"));
                     observations.push(Observation {
                         time: self.now.clone(),
                         event: Event::Unintelligible { said, why },
@@ -303,8 +301,7 @@ impl ProcessWorld {
         }
         let why = match ending {
             Some(status) => format!(
-                "the program has ended ({status}) before the run was over; what it printed to \
-                 standard error may say why"
+                "the program has ended ({status}) before the run was over; its standard error may contain the reason"
             ),
             None => "the program has closed its standard input or output before the run was over"
                 .to_owned(),
@@ -324,14 +321,13 @@ pub fn check_program(command: &str) -> Result<(), Error> {
 fn cannot_start(command: &str, why: &str) -> Error {
     Error::new(
         format!("cannot start the world `{command}`: {why}"),
-        "give a program and its arguments, separated by spaces; \
-         docs/formats/world-protocol.md says what it must do",
+        "give a program and its arguments, separated by spaces; docs/formats/world-protocol.md documents the protocol",
     )
 }
 
 fn endless_line() -> WorldError {
     WorldError::new(format!(
-        "it said more than {} MB without a line feed; write one message a line",
+        "it wrote more than {} MB without a line feed; expected one message per line",
         MAX_LINE >> 20
     ))
 }
@@ -339,7 +335,7 @@ fn endless_line() -> WorldError {
 /// `last` is the last invalid message of the answer.
 fn too_long(last: Option<&str>) -> WorldError {
     WorldError::new(format!(
-        "it said more than {} MB without ending its answer with `time`{}",
+        "it wrote more than {} MB without ending its answer with `time`{}",
         MAX_ANSWER >> 20,
         last.unwrap_or_default()
     ))

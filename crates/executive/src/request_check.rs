@@ -80,9 +80,9 @@ fn check_open_goal(name: &str, status: &Status) -> Result<(), Error> {
     }
     let help = match open.as_slice() {
         [] => "no goals are open".to_owned(),
-        open => format!("these are open: {}", open.join(", ")),
+        open => format!("open goals: {}", open.join(", ")),
     };
-    Err(Error::new("no goal of that name is open", help))
+    Err(Error::new("there is no open goal with this name", help))
 }
 
 fn check_ticket(ticket: ActionHandle, status: &Status) -> Result<(), Error> {
@@ -97,17 +97,17 @@ fn check_ticket(ticket: ActionHandle, status: &Status) -> Result<(), Error> {
                 .iter()
                 .map(|it| format!("{} {}", it.ticket, it.action));
             format!(
-                "these are running: {}",
+                "running actions: {}",
                 running.collect::<Vec<_>>().join(", ")
             )
         }
     };
-    let error = format!("no action with the ticket {} is running", ticket.0);
+    let error = format!("no running action has the ticket {}", ticket.0);
     Err(Error::new(error, help))
 }
 
 fn check_goal(goal: &str, has_deadline: bool, task: &Task) -> Result<(), Error> {
-    let help = "write a condition as it stands behind `:goal`, such as (at rover base)";
+    let help = "write a condition as after `:goal`, such as (at rover base)";
     let read = read_goal(task, goal).map_err(|why| Error::new(why, help))?;
     if read.is_trivial() {
         return Err(Error::new("the goal is empty", help));
@@ -128,8 +128,8 @@ fn check_name(name: &str) -> Result<(), Error> {
     let is_path = [".", ".."].contains(&name);
     if name.is_empty() || is_path || name.len() > MAX_NAME_LENGTH || !name.bytes().all(is_plain) {
         return Err(Error::new(
-            "this is no name for a goal",
-            "use up to 64 letters, digits, and `-`, `_` or `.`, not dots alone",
+            "invalid name of a goal",
+            "use up to 64 letters, digits, `-`, `_` and `.`, and not only dots",
         ));
     }
     Ok(())
@@ -138,7 +138,7 @@ fn check_name(name: &str) -> Result<(), Error> {
 fn check_terms(terms: &GoalTerms) -> Result<(), Error> {
     if !terms.value.is_positive() {
         return Err(Error::new(
-            "the value of a goal is not positive",
+            "the value of a goal must be positive",
             "give a positive number, such as 2.5",
         ));
     }
@@ -150,7 +150,7 @@ fn check_terms(terms: &GoalTerms) -> Result<(), Error> {
         return Ok(());
     }
     Err(Error::new(
-        "this is no name of a client",
+        "invalid name of a client",
         "use 1 to 64 characters on one line",
     ))
 }
@@ -161,7 +161,7 @@ fn check_seconds(seconds: Option<&Rational>, role: &str) -> Result<(), Error> {
         return Ok(());
     }
     Err(Error::new(
-        format!("the time {role} is not positive"),
+        format!("the time {role} must be positive"),
         "give the seconds from now, such as 60",
     ))
 }
@@ -175,8 +175,8 @@ fn check_fact(text: &str, task: &Task) -> Result<(), Error> {
     };
     if task.is_derived(fact) {
         return Err(Error::new(
-            format!("`{}` follows from other facts", task.fact_name(fact)),
-            "say those instead",
+            format!("`{}` is derived from other facts", task.fact_name(fact)),
+            "report those instead",
         ));
     }
     Ok(())
@@ -277,11 +277,11 @@ mod tests {
             (pursue("a/b", "(at r home)", 1), "no name"),
             (pursue("..", "(at r home)", 1), "no name"),
             (pursue("x", "(and)", 1), "empty"),
-            (by_deadline("(away r)"), "follows from other facts"),
+            (by_deadline("(away r)"), "is derived from other facts"),
             (by_deadline("(>= (charge r) 1)"), "about numbers"),
             (pursue(&long, "(at r home)", 1), "no name"),
             (fact("(at r nowhere)"), "no fact"),
-            (fact("(away r)"), "follows from other facts"),
+            (fact("(away r)"), "is derived from other facts"),
             (number("(charge home)"), "no fluent"),
         ] {
             let error = check(&request, &task).expect_err(words);

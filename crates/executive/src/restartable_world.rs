@@ -124,7 +124,7 @@ impl<'a> RestartableWorld<'a> {
             self.started = Clock::start();
             self.reconcile()?;
         }
-        let missing = || WorldError::new("the world is not there");
+        let missing = || WorldError::new("the world is not running");
         self.world.as_mut().ok_or_else(missing)
     }
 
@@ -162,9 +162,9 @@ impl<'a> RestartableWorld<'a> {
             let is_told = news.iter().any(|it| is_about(&it.event, ticket));
             if !(knows && is_told) {
                 let why = match (knows, is_resumed) {
-                    (true, _) => "the world knows nothing of it after the restart",
+                    (true, _) => "the world does not know this action after the restart",
                     (false, true) => {
-                        "it was running when the run was cut off, and the world does not know its outcome"
+                        "it was running when the run was interrupted, and the world does not know its outcome"
                     }
                     (false, false) => {
                         "it was running when the world ended, and the world does not know its outcome"
@@ -204,7 +204,7 @@ impl<'a> RestartableWorld<'a> {
             let delay = INITIAL_DELAY.saturating_mul(1 << self.restarts.min(16));
             self.restarts += 1;
             let words = format!(
-                "{}; the world is started again (restart {} of {})",
+                "{}; the world is restarted (restart {} of {})",
                 failure.message, self.restarts, self.launch.limits.restarts
             );
             self.launch.warnings.warn(&words);
@@ -296,7 +296,7 @@ impl World for RestartableWorld<'_> {
         }
         if let (Some(news), Command::Start { ticket, .. }) = (&mut self.news, command) {
             // The decision was made before the outcome of running actions was known.
-            let why = "it was not started: the world was started again just then";
+            let why = "it was not started: the world was being restarted";
             news.push(failed(*ticket, &self.last, why));
             return Ok(());
         }

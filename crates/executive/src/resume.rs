@@ -87,8 +87,8 @@ impl InterruptedRun {
         let name = path.display().to_string();
         if !is_journal(text) {
             return Err(Error::new(
-                format!("{name} is no journal of a run"),
-                "`elbowroom run --journal` writes them; a trace can be played back with --replay",
+                format!("{name} is not the journal of a run"),
+                "`elbowroom run --journal` writes journals; a trace can be replayed with --replay",
             ));
         }
         let mut journal = Journal::read(text)
@@ -96,9 +96,8 @@ impl InterruptedRun {
         if journal.text.is_empty() {
             let is_cut_off = !text.contains('\n');
             let (why, advice) = if is_cut_off {
-                let why =
-                    "it ends within its first record, so that the world has received no request";
-                (why, "remove it, and begin the run again")
+                let why = "it ends within its first record; the world has received no request";
+                (why, "remove it, and start the run again")
             } else {
                 ("its first record is damaged", DAMAGE_ADVICE)
             };
@@ -122,7 +121,7 @@ impl InterruptedRun {
             }
             return Err(Error::new(
                 format!("the run of {name} is over: {}", report.verdict),
-                "there is nothing to continue; `elbowroom report` shows the run",
+                "it cannot be resumed; `elbowroom report` shows it",
             ));
         }
         let spec = stored.header();
@@ -131,7 +130,7 @@ impl InterruptedRun {
         if spec.world_process.is_none() {
             return Err(unreadable_journal_error(
                 &name,
-                "its world was no process",
+                "its world was not a process",
                 OTHER_VERSION,
             ));
         }
@@ -298,8 +297,8 @@ impl InterruptedRun {
 }
 
 /// Advice for an intact journal that cannot be interpreted.
-const OTHER_VERSION: &str = "it may be of another version of this program: go on with that one, or begin a new \
-                             run with another journal";
+const OTHER_VERSION: &str = "another version of this program may have written it: resume with that version, or start a \
+                             new run with another journal";
 
 /// Error of a journal that another version has written.
 fn other_version_error(name: &str, error: &dyn fmt::Display) -> Error {
@@ -315,8 +314,8 @@ fn unreadable_journal_error(name: &str, message: &str, advice: &str) -> Error {
 fn deviation_error(name: &str, line: usize) -> Error {
     Error::new(
         format!(
-            "the journal {name} does not lead to the same decisions, from line {line} on; nothing was \
-             told to the world"
+            "the replay of the journal {name} makes other decisions from line {line} on; the world has received \
+             nothing"
         ),
         OTHER_VERSION,
     )
@@ -361,7 +360,9 @@ impl<'a> ResumedWorld<'a> {
     /// Returns the world behind the journal, unless the replay has deviated.
     fn world(&mut self) -> Result<&mut RestartableWorld<'a>, WorldError> {
         if self.replay.difference().is_some() {
-            return Err(WorldError::new("the journal leads to other decisions"));
+            return Err(WorldError::new(
+                "the replay of the journal makes other decisions",
+            ));
         }
         if let Some(status) = self.status.take() {
             status.set_replayed(false);

@@ -49,13 +49,11 @@ impl<'a> WorldSource<'a> {
             (Some(world), true) => Ok(Self::Embedded(Some(world))),
             (None, false) => Ok(Self::Program(name.to_owned())),
             (None, true) => Err(Error::new(
-                format!(
-                    "the world of this run, `{name}`, is an object in the process of its executive"
-                ),
-                "resume the run with the program that has started it, and give it the world",
+                format!("the world of this run, `{name}`, is an object in the executive's process"),
+                "resume the run with the program that has started it, and pass the world",
             )),
             (Some(_), false) => Err(Error::new(
-                "the world of this run is no object in the process of its executive",
+                "the world of this run is not an object in the executive's process",
                 "leave out the world",
             )),
         }

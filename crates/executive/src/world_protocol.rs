@@ -36,7 +36,7 @@ pub fn launch(command: &str) -> Result<(Child, LineWriter, LineReader), String> 
     let mut child = program.spawn().map_err(|error| no_program(name, &error))?;
     match (child.stdin.take(), child.stdout.take()) {
         (Some(stdin), Some(stdout)) => Ok((child, LineWriter::new(stdin), LineReader::new(stdout))),
-        _ => Err("its standard input and output are not there".to_owned()),
+        _ => Err("its standard input and output are missing".to_owned()),
     }
 }
 
@@ -86,7 +86,7 @@ fn no_program(name: &str, error: &io::Error) -> String {
     }
     match error.kind() {
         io::ErrorKind::PermissionDenied if path.is_file() => {
-            format!("you may not execute `{name}`; `chmod +x` makes a script a program")
+            format!("`{name}` is not executable; `chmod +x` makes a script executable")
         }
         _ => io_error_message(error),
     }

@@ -29,12 +29,12 @@ pub enum CommandError {
     )]
     Empty,
     /// A quotation mark is not closed.
-    #[error("this command line has a {0} without its partner")]
+    #[error("unbalanced {0} in the command line")]
     Unclosed(char),
     /// It lacks the placeholder of a file.
     #[error(
-        "this command line does not say where the {what} file goes: \
-         write {{{what}}} there, as in `myplanner {{domain}} {{problem}}`"
+        "this command line has no place for the {what} file: write {{{what}}} there, as in \
+         `myplanner {{domain}} {{problem}}`"
     )]
     Missing {
         /// `domain` or `problem`.
@@ -42,7 +42,7 @@ pub enum CommandError {
     },
     /// It contains an unknown placeholder.
     #[error(
-        "unknown placeholder `{{{0}}}`: there are {{domain}}, {{problem}}, {{plan}}, {{time}} and \
+        "unknown placeholder `{{{0}}}`; known are {{domain}}, {{problem}}, {{plan}}, {{time}} and \
          {{memory}}"
     )]
     Unknown(String),
@@ -203,8 +203,8 @@ mod tests {
     #[test]
     fn command_requires_file_placeholders() {
         let mistake = |line| Command::parse(line).unwrap_err().to_string();
-        assert!(mistake("popf {domain}").contains("where the problem file goes"));
-        assert!(mistake("popf d.pddl p.pddl").contains("where the domain file goes"));
+        assert!(mistake("popf {domain}").contains("no place for the problem file"));
+        assert!(mistake("popf d.pddl p.pddl").contains("no place for the domain file"));
         assert!(mistake(" ").contains("empty"));
         assert!(mistake("popf {domain} {problem} {paln}").contains("{paln}"));
         assert!(mistake("popf '{domain} {problem}").contains('\''));

@@ -140,11 +140,11 @@ impl fmt::Display for Outcome {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Plan(found) => write!(f, "a plan that ends at {}", found.makespan),
-            Self::Unsolvable { says } => write!(f, "it says that there is no plan: {says}"),
+            Self::Unsolvable { says } => write!(f, "it reports that no plan exists: {says}"),
             Self::NoneInTime => f.write_str("no plan within the time limit"),
             Self::Stopped => f.write_str("no plan before it was stopped"),
             Self::GaveUp { says } => write!(f, "it found no plan: {says}"),
-            Self::Unsupported { says } => write!(f, "it does not take this problem: {says}"),
+            Self::Unsupported { says } => write!(f, "it does not support this problem: {says}"),
             Self::Crashed { signal, .. } => write!(f, "it crashed ({})", signal_name(*signal)),
             Self::OutOfMemory { peak: 0 } => f.write_str("it ran out of memory"),
             Self::OutOfMemory { peak } => {
@@ -152,7 +152,7 @@ impl fmt::Display for Outcome {
             }
             Self::NotUnderstood { code, .. } => write!(
                 f,
-                "it ended with exit code {code} and without a plan, and does not say why"
+                "it ended with exit code {code}, without a plan and without a reason"
             ),
             Self::NotStarted { reason, .. } => write!(f, "it cannot be started: {reason}"),
             Self::Refused { reason, .. } => write!(f, "its plan is not valid: {reason}"),

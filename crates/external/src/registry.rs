@@ -46,13 +46,13 @@ pub const REGISTRY: &[Registered] = &[
         variable: "ELBOWROOM_POPF",
         programs: &["popf", "popf3-clp", "popf2"],
         arguments: &["{domain}", "{problem}"],
-        install_hint: "build it from its source (ROSPlan and PlanSys2 bring one), and put `popf` \
-                     into PATH or its path into ELBOWROOM_POPF",
+        install_hint: "build it from its source (ROSPlan and PlanSys2 contain it), and put `popf` \
+                       into PATH or its path into ELBOWROOM_POPF",
         exit_phrases: COLIN_FAMILY,
     },
     Registered {
         name: "optic",
-        summary: "OPTIC: POPF with preferences and time-dependent costs; goes on to better plans \
+        summary: "OPTIC: POPF with preferences and time-dependent costs; continues to better plans \
                   (Benton, Coles and Coles, ICAPS 2012)",
         variable: "ELBOWROOM_OPTIC",
         programs: &["optic-clp", "optic", "optic-cplex"],
@@ -82,7 +82,7 @@ pub const REGISTRY: &[Registered] = &[
     },
     Registered {
         name: "lpg-td",
-        summary: "LPG-td: local search on temporal action graphs; goes on to better plans \
+        summary: "LPG-td: local search on temporal action graphs; continues to better plans \
                   (Gerevini, Saetti and Serina, JAIR 2006)",
         variable: "ELBOWROOM_LPG",
         programs: &["lpg-td", "lpg"],
@@ -102,8 +102,8 @@ pub const REGISTRY: &[Registered] = &[
             "-cputime",
             "{time}",
         ],
-        install_hint: "`pip install up-lpg` brings the program `up_lpg/lpg`; put its path into \
-                     ELBOWROOM_LPG",
+        install_hint: "`pip install up-lpg` installs the program `up_lpg/lpg`; put its path into \
+                       ELBOWROOM_LPG",
         exit_phrases: ExitPhrases {
             unsolvable: &[
                 "the problem is unsolvable",
@@ -194,7 +194,7 @@ pub enum Kind {
 pub enum PlannerError {
     /// The name is not in the registry.
     #[error(
-        "unknown planner `{0}`: there are {known}, up:ENGINE, and command lines such as \
+        "unknown planner `{0}`; known are {known}, up:ENGINE, and command lines such as \
          \"myplanner {{domain}} {{problem}}\"",
         known = names()
     )]
@@ -253,15 +253,14 @@ impl Planner {
             },
             install_hint: if ENGINES.contains(&engine) {
                 format!(
-                    "install Python and `pip install unified-planning up-{engine}`; where that is \
-                     not the `python3` in PATH, put the path of its interpreter into \
-                     ELBOWROOM_PYTHON"
+                    "install Python and `pip install unified-planning up-{engine}`; if that is not \
+                     the `python3` in PATH, put the path of its interpreter into ELBOWROOM_PYTHON"
                 )
             } else {
                 format!(
-                    "check the name: engines of unified-planning are {}; one that you wrote \
-                     yourself has to be installed where the `python3` in PATH, or the interpreter \
-                     that ELBOWROOM_PYTHON names, finds it",
+                    "check the name: engines of unified-planning are {}; your own engine must be \
+                     installed for the `python3` in PATH, or for the interpreter in \
+                     ELBOWROOM_PYTHON",
                     ENGINES.join(", ")
                 )
             },

@@ -55,10 +55,9 @@ impl Question {
         };
         let text = write_problem(request.task, request.situation, &how)
             .map_err(|error| error.to_string())?;
-        let (problem, _) = read_problem(request.domain, &Source::new("situation", text.as_str()))
-            .map_err(|errors| {
-            format!("its situation cannot be written as a problem: {errors}")
-        })?;
+        let (problem, _) =
+            read_problem(request.domain, &Source::new("situation", text.as_str()))
+                .map_err(|errors| format!("its state cannot be written as a problem: {errors}"))?;
         Ok(Self {
             text,
             task: Task::new(problem).with_epsilon(epsilon.clone()),

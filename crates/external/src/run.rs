@@ -43,10 +43,10 @@ pub fn plan(
     } else {
         // Checked before any use of clocks and folders, which some systems lack.
         let reason = format!(
-            "{} is another program, and this system runs none",
+            "{} is an external planner, and this system does not support them",
             planner.name
         );
-        Err(not_started(reason, "plan with the embedded planner"))
+        Err(not_started(reason, "use the embedded planner"))
     };
     match prepared {
         Ok((question, workspace, command)) => {

@@ -27,8 +27,7 @@ pub(super) fn prepare(
     settings: &Settings,
 ) -> Result<(Question, Workspace, process::Command), Outcome> {
     let question = Question::of(request).map_err(|reason| {
-        let help =
-            "plan from a moment at which that action has ended, or with the embedded planner";
+        let help = "plan from a time at which that action has ended, or use the embedded planner";
         not_started(reason, help)
     })?;
     let program = match &planner.kind {
@@ -37,7 +36,7 @@ pub(super) fn prepare(
     };
     let found = find_program(program).ok_or_else(|| {
         let what = if program.is_file() {
-            "you may not execute"
+            "no permission to execute"
         } else {
             "there is no program"
         };
@@ -49,12 +48,12 @@ pub(super) fn prepare(
     let domain = request.domain.text();
     let scratch = settings.scratch.as_deref();
     let workspace = Workspace::new(scratch, domain, &question.text).map_err(|error| {
-        let help = "make room there, or set TMPDIR to a folder that you may write to";
-        not_started(format!("no temporary folder can be made: {error}"), help)
+        let help = "free some disk space there, or set TMPDIR to a folder with write permission";
+        not_started(format!("cannot create a temporary folder: {error}"), help)
     })?;
     let command = command(planner, &found, &workspace, settings).map_err(|error| {
         not_started(
-            format!("its folder cannot be filled: {error}"),
+            format!("cannot write to its folder: {error}"),
             "free some disk space",
         )
     })?;

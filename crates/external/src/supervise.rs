@@ -78,7 +78,7 @@ pub(super) fn supervise(
         let _ = (command, limits, stop, watcher);
         Err(io::Error::new(
             io::ErrorKind::Unsupported,
-            "other planners are run on Unix systems only",
+            "external planners need a Unix system",
         ))
     }
 }

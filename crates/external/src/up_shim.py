@@ -101,13 +101,13 @@ def main():
             sys.exit(MISSING)
     elif engine not in environment.factory.engines:
         known = ", ".join(sorted(environment.factory.engines))
-        print(f"elbowroom: missing: there is no engine `{engine}`, only {known}", flush=True)
+        print(f"elbowroom: missing: unknown engine `{engine}`; known are {known}", flush=True)
         sys.exit(MISSING)
     knows_reals = "REAL_FLUENTS" in environment.factory.engine(engine).supported_kind().features
     try:
         task = read(domain, problem, integers=not knows_reals)
         if not knows_reals and has_fractions(task):
-            unsupported(f"{engine} only knows integers, and this problem has other numbers")
+            unsupported(f"{engine} supports only integers, and this problem has other numbers")
     except SystemExit:
         raise
     except Exception as error:
@@ -129,9 +129,9 @@ def main():
     if shown:
         return 0
     if status == Status.UNSOLVABLE_PROVEN:
-        print(f"elbowroom: unsolvable: {engine} has a proof", flush=True)
+        print(f"elbowroom: unsolvable: {engine} has proved it", flush=True)
     elif status == Status.UNSUPPORTED_PROBLEM:
-        unsupported(f"{engine} does not take this problem")
+        unsupported(f"{engine} does not support this problem")
     elif status == Status.MEMOUT:
         print("out of memory", file=sys.stderr, flush=True)
         return 1

@@ -66,7 +66,8 @@ pub enum CompareError {
     Other(String),
     /// The results are those of another experiment.
     #[error(
-        "these are results of another experiment; give those of its parts, made from the same files"
+        "these are results of another experiment; expected results of parts that were made from \
+         the same files"
     )]
     WrongExperiment,
 }

@@ -82,7 +82,7 @@ pub fn trace(
     (row, column): (usize, usize),
     id: TrialId,
 ) -> Result<String, ExperimentError> {
-    let wrong = || ExperimentError::other("there is no such trial".to_owned());
+    let wrong = || ExperimentError::other("unknown trial".to_owned());
     let executor = experiment.executors.get(row).ok_or_else(wrong)?;
     let column = experiment.columns.get(column).ok_or_else(wrong)?;
     // Plans for other executors and columns are not prepared.

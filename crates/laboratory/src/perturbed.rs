@@ -159,7 +159,7 @@ pub fn repeat_trials(
     for &(row, trial) in trials {
         let &(case, world, executor) = rows
             .get(row)
-            .ok_or_else(|| PerturbedError::other("there is no such row"))?;
+            .ok_or_else(|| PerturbedError::other("unknown row"))?;
         let setting = match settings.entry(case) {
             Entry::Occupied(entry) => entry.into_mut(),
             Entry::Vacant(entry) => entry.insert(Setting::new(experiment, case)?),
@@ -192,16 +192,16 @@ impl<'e> Setting<'e> {
         .map_err(PerturbedError::Text)?;
         if likelihoods.has_rates() {
             return Err(wrong(
-                &"the likelihoods have rates per second, and a perturbed world has steps and no \
-                  seconds: give `becomes_true` and `becomes_false` instead, and `end` instead of \
+                &"the likelihoods have rates per second, but a perturbed world has only steps: use \
+                  `becomes_true` and `becomes_false` instead, and `end` instead of \
                   `during_per_second`",
             ));
         }
         let is_published = experiment.worlds.contains(&WorldKind::AsPublished);
         if is_published && likelihoods.has_failing_ends() {
             return Err(wrong(
-                &"the likelihoods have actions whose ends fail, and in the world `as-published` \
-                  they do not: take the world `sound`",
+                &"the likelihoods have actions whose ends fail, which the world `as-published` \
+                  does not support: use the world `sound`",
             ));
         }
         let actions = all_actions_under(&task, &likelihoods).map_err(|error| wrong(&error))?;

@@ -178,7 +178,7 @@ fn unsupported_likelihoods_are_rejected_by_name() {
     experiment.cases[0].likelihoods = likelihoods;
     experiment.worlds = vec![WorldKind::AsPublished];
     let told = said(&experiment);
-    assert!(told.contains("take the world `sound`"), "{told}");
+    assert!(told.contains("use the world `sound`"), "{told}");
 }
 
 #[test]

@@ -70,7 +70,7 @@ fn columns(source: &Source, header: &csv::StringRecord) -> Result<Columns, Diagn
     for column in header {
         if !known.clone().any(|name| column.eq_ignore_ascii_case(name)) {
             let names = known.clone().collect::<Vec<_>>().join(", ");
-            let mut message = format!("`{column}` is no column that is known: {names}");
+            let mut message = format!("unknown column `{column}`; known are {names}");
             if let Some(near) = nearest(&column.to_lowercase(), known.clone()) {
                 message = format!("{message}; did you mean `{near}`?");
             }
@@ -107,7 +107,7 @@ fn record(columns: &Columns, row: &csv::StringRecord) -> Result<Record, String> 
         "running" => Outcome::Running,
         other => {
             let known = OUTCOMES.join(", ");
-            return Err(format!("`{other}` is no outcome; known are {known}"));
+            return Err(format!("unknown outcome `{other}`; known are {known}"));
         }
     };
     let start = optional(Some(columns.start), "start")?;
@@ -115,10 +115,10 @@ fn record(columns: &Columns, row: &csv::StringRecord) -> Result<Record, String> 
     let planned = optional(columns.planned, "planned")?;
     let end = number(field(columns.end), "end")?;
     if outcome == Outcome::Succeeded && start.is_none() {
-        return Err("an action that succeeded has a start".to_owned());
+        return Err("an action that succeeded needs a start".to_owned());
     }
     if start.is_none() && commanded.is_none() {
-        return Err("there is neither a start nor a command".to_owned());
+        return Err("both the start and the command are missing".to_owned());
     }
     if start.is_some_and(|start| end < start) {
         return Err("the end is before the start".to_owned());
@@ -157,7 +157,7 @@ fn action(text: &str) -> Result<String, String> {
     };
     if words.is_empty() || !words.iter().all(is_name) {
         return Err(format!(
-            "`{text}` is no action; write `(drive rover depot shelf)`"
+            "expected an action, such as `(drive rover depot shelf)`, found `{text}`"
         ));
     }
     Ok(format!("({})", words.join(" ")))
@@ -168,7 +168,9 @@ fn number(text: &str, column: &str) -> Result<f64, String> {
     match value {
         Ok(value) if value.is_finite() => Ok(value),
         _ if text.is_empty() => Err(format!("the {column} is missing")),
-        _ => Err(format!("the {column} `{text}` is no number of seconds")),
+        _ => Err(format!(
+            "expected seconds in the column {column}, found `{text}`"
+        )),
     }
 }
 
@@ -188,7 +190,7 @@ fn error_at(source: &Source, place: Span, message: impl Into<String>) -> Diagnos
 }
 
 fn unreadable(error: &csv::Error) -> String {
-    format!("this is no table: {error}")
+    format!("cannot read the table: {error}")
 }
 
 #[cfg(test)]
@@ -226,8 +228,8 @@ mod tests {
             ("(a),x,2,succeeded", "the start `x` is no number"),
             ("(a),1,,succeeded", "the end is missing"),
             ("(a),1,inf,succeeded", "no number"),
-            ("(a),1,2,done", "`done` is no outcome"),
-            (",1,2,succeeded", "is no action"),
+            ("(a),1,2,done", "unknown outcome `done`"),
+            (",1,2,succeeded", "expected an action"),
             ("(a),,2,succeeded", "has a start"),
             ("(a),,2,failed", "neither a start nor a command"),
         ] {

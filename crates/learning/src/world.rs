@@ -115,7 +115,10 @@ fn durations(text: &mut String, learnt: &Learnt) {
 fn describe_samples(group: &Group) -> String {
     match group.counts() {
         (observed, 0) => format!("from {observed} durations"),
-        (observed, censored) => format!("from {observed} durations and {censored} cut off"),
+        (observed, censored) => format!(
+            "from {observed} complete and {censored} censored \
+                                         durations"
+        ),
     }
 }
 

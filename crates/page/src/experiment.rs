@@ -10,7 +10,7 @@ use crate::document::{Document, Rate, RateGroup, Rates, Section, Table, Text, To
 
 /// The meaning of the intervals.
 pub(crate) const INTERVALS: &str =
-    "The share of runs that reached the goal, with Wilson's 95 % interval.";
+    "Share of runs that reached the goal, with Wilson's 95 % interval.";
 
 /// The pages of some failed trials, by row, column and kind of failure.
 pub(crate) type Trials = BTreeMap<FailurePosition, Document>;
@@ -22,7 +22,7 @@ pub(crate) fn timed(results: &Results, trials: Trials) -> Document {
         note: if results.optimum.is_empty() {
             INTERVALS.to_owned()
         } else {
-            format!("{INTERVALS} The line marks what the best of all executors can reach at most.")
+            format!("{INTERVALS} The line marks an upper bound for all executors.")
         },
         groups: (0..results.columns.len())
             .map(|column| group(results, column))
@@ -95,8 +95,8 @@ fn failures(results: &Results, trials: Trials) -> (Option<Section>, Vec<Document
     }
     let table = Table {
         heading: "Where runs fail".to_owned(),
-        note: "Failed runs, by what the last plan was given up for, and the action that this was \
-               about."
+        note: "Failed runs, by the reason for which the last plan was abandoned and the action \
+               concerned."
             .to_owned(),
         columns: column_headings(&columns),
         ..Table::default()
@@ -161,7 +161,7 @@ pub(crate) fn document(
 /// States the number of trials.
 pub(crate) fn trial_count_text(count: u64, what: &str, is_interrupted: bool) -> String {
     if is_interrupted {
-        return format!("{count} {what}; the experiment was interrupted before all were made.");
+        return format!("{count} {what}; the experiment was interrupted before it was complete.");
     }
     format!("{count} {what}.")
 }
@@ -248,7 +248,7 @@ fn pairs(results: &Results) -> Table {
         ("world".to_owned(), false),
         ("executor".to_owned(), false),
         (format!("only {first} reached the goal"), true),
-        ("only this one did".to_owned(), true),
+        ("only this one reached it".to_owned(), true),
         ("p".to_owned(), true),
     ];
     let mut rows: Vec<Vec<Text>> = Vec::new();
@@ -271,10 +271,11 @@ fn pairs(results: &Results) -> Table {
     }
     Table {
         heading: format!("Compared with {first}, trial by trial"),
-        note: "All executors meet the same worlds. p is that of McNemar's exact test: how likely \
-               so uneven a division would be if both were equally good. It is not corrected for \
-               the number of comparisons."
-            .to_owned(),
+        note:
+            "All executors run in the same worlds. p is the p-value of McNemar's exact test: the \
+               probability of a difference at least this large if both executors were equally \
+               good. It is not corrected for multiple comparisons."
+                .to_owned(),
         columns: columns.to_vec(),
         rows,
         ..Table::default()

@@ -41,14 +41,14 @@ struct Kind {
 const FILE: Kind = Kind {
     live: "",
     reach: "",
-    foot: "Made by Elbowroom. This page is one file, and loads nothing.",
+    foot: "Made by Elbowroom. This page is a single file without external resources.",
 };
 
 const LIVE: Kind = Kind {
     live: " data-live",
     reach: "; connect-src 'self'",
-    foot: "Served by Elbowroom while it runs the plan. <code>elbowroom report</code> makes a page that \
-           stays from the run's trace.",
+    foot: "Served by Elbowroom while it runs the plan. <code>elbowroom report</code> makes a \
+           permanent page from the run's trace.",
 };
 
 fn fill_template(document: &Document, kind: &Kind) -> String {

@@ -66,15 +66,15 @@ pub use operator::operator_page;
 pub enum PageError {
     /// The text has no known format.
     #[error(
-        "{0} is none of what a page can be made of: the trace of a run (`run --trace`), \
-         an answer (`envelope --json`, `plan --json`, `run --json`), or the results of an experiment \
+        "{0} has none of the formats for pages: the trace of a run (`run --trace`), an answer \
+         (`envelope --json`, `plan --json`, `run --json`), or the results of an experiment \
          (`results.json` of `compare`)"
     )]
     Unknown(String),
     /// The text is a document of this program, but there are no pages for its format.
     #[error(
-        "{name} is a document of the format {format}; pages are made of traces (`run --trace`), of \
-         the answers of `envelope`, `plan` and `run`, and of the results of `compare`"
+        "{name} is a document of the format {format}; pages are made from traces (`run --trace`), \
+         from the answers of `envelope`, `plan` and `run`, and from the results of `compare`"
     )]
     OtherFormat {
         /// The name of the text.
@@ -83,7 +83,7 @@ pub enum PageError {
         format: String,
     },
     /// The text is not a trace of a run.
-    #[error("{0} is not the trace of a run (`run --trace`), and other viewers show nothing else")]
+    #[error("{0} is not the trace of a run (`run --trace`); other viewers accept only traces")]
     NoRun(String),
     /// The text states a supported format, but is damaged or has another version.
     #[error("{name} cannot be read: {why}")]

@@ -196,7 +196,7 @@ impl Trace {
             }
         }
         if !chart.marks.is_empty() {
-            let track = self.track("deadlines and other moments", Some(run), false);
+            let track = self.track("deadlines and other events", Some(run), false);
             for mark in &chart.marks {
                 self.event(mark.at, Kind::Instant, track, named(&mark.name));
             }

@@ -56,8 +56,8 @@ pub(crate) fn untimed_experiment(results: &PerturbedResults, trials: Trials) -> 
         Section::Rates(Rates {
             heading: "Trials that succeeded".to_owned(),
             note: format!(
-                "{INTERVALS} The line marks the published share or, where there is none, the \
-                 greatest possible one, as far as they are known."
+                "{INTERVALS} The line marks the published share or, without one, the greatest \
+                 possible share, if known."
             ),
             groups,
         }),
@@ -95,19 +95,16 @@ fn failures(results: &PerturbedResults, trials: Trials) -> (Option<Section>, Vec
         ("case", false),
         ("world", false),
         ("executor", false),
-        ("why it failed", false),
+        ("reason", false),
         ("last step", false),
-        ("its outcome", false),
+        ("outcome", false),
         ("trials", true),
         ("first", true),
     ];
     let mut kinds = Vec::new();
     for (place, row) in results.rows.iter().enumerate() {
         for (kind, failure) in row.failures.kinds().into_iter().enumerate() {
-            let last = failure
-                .cause
-                .as_deref()
-                .map_or("there was none", last_step_result);
+            let last = failure.cause.as_deref().map_or("none", last_step_result);
             let cells = vec![
                 row.case.as_str().into(),
                 serialized_name(&row.world).into(),
@@ -123,7 +120,7 @@ fn failures(results: &PerturbedResults, trials: Trials) -> (Option<Section>, Vec
     }
     let table = Table {
         heading: "Where trials fail".to_owned(),
-        note: "Failed trials, by what ended them and by their last step.".to_owned(),
+        note: "Failed trials, by the reason for their end and by their last step.".to_owned(),
         columns: column_headings(&columns),
         ..Table::default()
     };
@@ -163,7 +160,7 @@ pub(crate) fn trial_page(course: &StoredTrial) -> Document {
         ("step", true),
         ("plan", true),
         ("action", false),
-        ("its outcome", false),
+        ("outcome", false),
         ("became true", false),
         ("became false", false),
     ];
@@ -178,7 +175,7 @@ pub(crate) fn trial_page(course: &StoredTrial) -> Document {
         },
         Table {
             heading: "Plans".to_owned(),
-            note: "A new one is made when the one before does not work any more.".to_owned(),
+            note: "A new plan is made when the previous one has become infeasible.".to_owned(),
             columns: column_headings(&[("plan", true), ("actions", false)]),
             rows: plans,
             ..Table::default()
@@ -207,9 +204,9 @@ pub(crate) fn trial_page(course: &StoredTrial) -> Document {
 fn ending(name: &str) -> &str {
     match name {
         "goal-reached" => "the goal was reached",
-        "no-plan" => "there was no plan any more",
-        "rounds-used-up" => "no plan that was made led to the goal",
-        "dead-end" => "too many steps ended where there is no plan",
+        "no-plan" => "there was no further plan",
+        "rounds-used-up" => "no plan reached the goal",
+        "dead-end" => "too many steps ended in states without a plan",
         "steps-used-up" => "the trial took too many steps",
         other => other,
     }
@@ -235,7 +232,7 @@ fn step_result(step: &StoredStep) -> String {
         other => other,
     };
     if step.is_dead_end {
-        format!("{words}, and there was no plan any more")
+        format!("{words}, and there was no further plan")
     } else {
         words.to_owned()
     }

@@ -73,10 +73,12 @@ pub(crate) fn envelope(answer: &EnvelopeAnswer) -> Document {
             };
             positive_verdict(&match stop {
                 Stop::Converged => format!(
-                    "The plan works as long as each quantity stays inside its interval{before}, whatever the others do in theirs."
+                    "The plan works as long as each quantity stays inside its interval{before}. \
+                     The quantities may vary independently."
                 ),
                 _ => format!(
-                    "The plan works as long as each quantity stays inside its interval{before}. The search was ended early: wider intervals may also do."
+                    "The plan works as long as each quantity stays inside its interval{before}. \
+                     The search was stopped early: wider intervals may be possible."
                 ),
             })
         }
@@ -99,17 +101,17 @@ pub(crate) fn envelope(answer: &EnvelopeAnswer) -> Document {
             sections.extend(failure(counterexample, &mut texts));
             sections.push(Section::Table(quantities(parameters)));
             sections.push(repair_advice());
-            negative_verdict("The plan fails even if nothing deviates.")
+            negative_verdict("The plan fails even without deviations.")
         }
         EnvelopeFinding::Fails(NominalFailure::Invalid { violation }) => {
-            sections.push(prose("What is wrong", vec![violation.message.clone()]));
+            sections.push(prose("Violation", vec![violation.message.clone()]));
             sections.push(repair_advice());
-            negative_verdict("The plan is not valid as it stands.")
+            negative_verdict("The plan is not valid.")
         }
         EnvelopeFinding::None { stop } => Verdict {
             tone: Tone::Plain,
             words: format!(
-                "Nothing is known yet: the search ended before it began ({}).",
+                "No result: the search was stopped before its first check ({}).",
                 serialized_name(stop)
             ),
         },
@@ -374,8 +376,8 @@ fn details(
         details.push(("times out after", nearest(timeout).into()));
     }
     let limits = [
-        ("not less, because", &room.lower_limit),
-        ("not more, because", &room.upper_limit),
+        ("lower limit", &room.lower_limit),
+        ("upper limit", &room.upper_limit),
     ];
     for (label, limit) in limits {
         if let Some(limit) = limit {
@@ -389,7 +391,7 @@ fn details(
 /// work.
 pub(crate) fn repair_advice() -> Section {
     let advice = "elbowroom envelope DOMAIN PROBLEM PLAN --repair prints the cheapest repair.";
-    prose("What to do", vec![advice.to_owned()])
+    prose("Remedy", vec![advice.to_owned()])
 }
 
 pub(crate) fn prose(heading: &str, paragraphs: Vec<String>) -> Section {

@@ -69,9 +69,9 @@ pub(crate) fn region(answer: &RegionAnswer) -> Document {
                     .map(|it| Section::Table(times(it, "for which the plan works"))),
             );
             match (&pieces[..], missing) {
-                ([], _) => negative_verdict("The plan works with no values."),
+                ([], _) => negative_verdict("The plan fails for all values."),
                 (_, Some(missing)) => positive_verdict(&format!(
-                    "The plan works with all values below. There may be more, for {missing}."
+                    "The plan works with all values below. The list may be incomplete: {missing}."
                 )),
                 ([_], None) => positive_verdict(
                     "The plan works with all values that satisfy the inequalities below.",
@@ -83,9 +83,9 @@ pub(crate) fn region(answer: &RegionAnswer) -> Document {
             }
         }
         RegionFinding::Invalid { violation } => {
-            sections.push(prose("What is wrong", vec![violation.message.clone()]));
+            sections.push(prose("Violation", vec![violation.message.clone()]));
             sections.push(repair_advice());
-            negative_verdict("The plan is not valid as it stands.")
+            negative_verdict("The plan is not valid.")
         }
         RegionFinding::Unscheduled => {
             negative_verdict("The plan has no schedule at its nominal values.")
@@ -96,7 +96,10 @@ pub(crate) fn region(answer: &RegionAnswer) -> Document {
         },
     };
     Document {
-        title: format!("Where {} works", name_of(&answer.plan, &answer.problem)),
+        title: format!(
+            "Feasible region of {}",
+            name_of(&answer.plan, &answer.problem)
+        ),
         verdict,
         facts,
         sections,
@@ -167,7 +170,7 @@ fn plane(parameters: &[Quantity], pieces: &[PieceAnswer], boxes: &[BoxAnswer]) -
     let quantities = parameters.iter().enumerate().map(quantity).collect();
     Plane {
         heading: "Two quantities at a time".to_owned(),
-        note: "Where the plan works, by two quantities; the others have the values that are chosen with \
+        note: "Feasible values of two quantities. The other quantities have the values of the \
                sliders."
             .to_owned(),
         quantities,
@@ -215,9 +218,9 @@ fn rows(pieces: &[PieceAnswer], texts: &mut Texts) -> Table {
         columns.push(("list".to_owned(), true));
     }
     columns.push(("inequality".to_owned(), false));
-    columns.push(("its source".to_owned(), false));
+    columns.push(("source".to_owned(), false));
     Table {
-        heading: "What the values satisfy".to_owned(),
+        heading: "Inequalities".to_owned(),
         columns,
         rows,
         ..Table::default()
@@ -229,7 +232,7 @@ fn volume(measure: &Measure) -> String {
         (Some(volume), _) if volume.0.to_string().len() <= 24 => volume.0.to_string(),
         (None, Some([lower, upper])) => {
             format!(
-                "10^{:.2}, with 95 % between 10^{lower:.2} and 10^{upper:.2}",
+                "10^{:.2}, 95 % interval 10^{lower:.2} to 10^{upper:.2}",
                 measure.log10
             )
         }
@@ -250,7 +253,7 @@ fn shares(boxes: &[BoxAnswer]) -> Option<Section> {
     let words = |share: &Share| match share.interval {
         None => percent(share.decimal),
         Some([lower, upper]) => format!(
-            "{}, with 95 % between {} and {}",
+            "{}, 95 % interval {} to {}",
             percent(share.decimal),
             percent(lower),
             percent(upper)
@@ -265,7 +268,7 @@ fn shares(boxes: &[BoxAnswer]) -> Option<Section> {
         .collect();
     (!rows.is_empty()).then(|| {
         Section::Table(Table {
-            heading: "How much of it is in a box".to_owned(),
+            heading: "Share of the region in each box".to_owned(),
             columns: vec![
                 ("box".to_owned(), false),
                 ("share of the volume".to_owned(), false),

@@ -189,7 +189,8 @@ fn predictions(stored: &Stored, spec: &RunSpec, task: &Task) -> Option<Section> 
     (!rows.is_empty()).then(|| {
         Section::Table(Table {
             heading: "Predictions of the believed world".to_owned(),
-            note: "Actions of each name that ended by themselves, beside the model of --believed."
+            note: "Actions of each name that ended by themselves, compared with the model of \
+                   --believed."
                 .to_owned(),
             columns: columns
                 .map(|(name, is_number)| (name.to_owned(), is_number))
@@ -203,7 +204,8 @@ fn predictions(stored: &Stored, spec: &RunSpec, task: &Task) -> Option<Section> 
 /// Describes the part of the run that is missing if the record does not begin with the run.
 fn omitted_part_note(stored: &Stored, left_out: usize) -> Option<String> {
     if stored.has_snapshot() {
-        let words = "everything before this segment of the journal, except the last actions, facts and numbers";
+        let words = "all records before this segment of the journal, except the last actions, \
+                     facts and numbers";
         return Some(words.to_owned());
     }
     let words = || format!("the first {left_out} lines of the trace, and facts and numbers");
@@ -216,7 +218,7 @@ fn unfinished_verdict(record: Record, is_paused: bool, now: &Rational) -> Verdic
     let words = match record {
         Record::Ended => format!("The trace ends at {now} before the run was over."),
         Record::Live { .. } if is_paused => {
-            format!("The run is paused: nothing more is started. It is at {now}.")
+            format!("The run is paused at {now}: no further actions are started.")
         }
         Record::Live { .. } => format!("The run continues; its time is {now}."),
     };
@@ -337,7 +339,7 @@ impl Bars {
             .collect();
         marks.extend(self.events());
         Chart {
-            heading: "The run beside its plan".to_owned(),
+            heading: "The run and its plan".to_owned(),
             end: end_of_axis(&bars, &marks),
             groupings,
             chosen,

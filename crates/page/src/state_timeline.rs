@@ -250,7 +250,7 @@ fn line(name: String, points: &[(Rational, Rational)]) -> SeriesLine {
     SeriesLine {
         name,
         words: format!(
-            "{} at first, {} at last, between {} and {}",
+            "{} at the beginning, {} at the end, between {} and {}",
             word(values().next()),
             word(values().next_back()),
             word(values().min()),

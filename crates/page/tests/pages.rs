@@ -241,7 +241,7 @@ fn non_document_is_rejected_with_one_sentence() {
     ] {
         let sentence = refused(text);
         assert!(
-            sentence.starts_with("file is none of what"),
+            sentence.starts_with("file has none of the formats"),
             "{text}: {sentence}"
         );
         assert!(!sentence.contains('\n'));

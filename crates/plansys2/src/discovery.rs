@@ -71,7 +71,8 @@ impl PerformerDiscovery {
             return Ok(true);
         }
         Err(format!(
-            "no performer of {} was heard within {} s; heard: {}. Start it, or wait longer with --within",
+            "no performer of {} was discovered within {} s; discovered: {}. Start it, or wait \
+             longer with --within",
             missing.join(", "),
             self.within.as_secs_f64(),
             hub.listed(now)
@@ -149,7 +150,7 @@ mod tests {
         let mut census = PerformerDiscovery::new(vec!["move".into(), "pick".into()], seconds(3));
         let hub = hub_with("MOVE");
         assert_eq!(census.is_over(&hub, seconds(2)), Ok(false));
-        let why = "no performer of pick was heard within 3 s; heard: robot1 (MOVE). Start it, or wait longer with --within";
+        let why = "no performer of pick was discovered within 3 s; discovered: robot1 (MOVE). Start it, or wait longer with --within";
         assert_eq!(census.is_over(&hub, seconds(3)), Err(why.into()));
         let mut census = PerformerDiscovery::new(vec!["move".into()], seconds(3));
         assert_eq!(census.is_over(&hub, seconds(0)), Ok(true));

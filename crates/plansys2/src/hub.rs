@@ -174,7 +174,7 @@ impl Hub {
     fn warn_of_other_executor(&mut self, message: &ActionExecution) {
         if message.node_id != self.name && self.others.insert(message.node_id.clone()) {
             self.effects.push(Effect::Remark(format!(
-                "another executor, {}, is asking performers too: PlanSys2's own must be off",
+                "another executor, {}, also requests performers: PlanSys2's own must be off",
                 message.node_id
             )));
         }
@@ -226,7 +226,7 @@ impl Hub {
         let ticket = deal.action.ticket;
         let told = if !message.success {
             ActionUpdate::Failed(if message.status.is_empty() {
-                format!("{} has not said why", message.node_id)
+                format!("{} gave no reason", message.node_id)
             } else {
                 message.status.clone()
             })
@@ -263,8 +263,7 @@ impl Hub {
                 state::RUNNING => deal.idle = None,
                 _ => {
                     if now.saturating_sub(*deal.idle.get_or_insert(now)) >= IDLE_TIMEOUT {
-                        let why =
-                            format!("{node} does nothing, and has not said how this has ended");
+                        let why = format!("{node} is idle, and has not reported the outcome");
                         over.push((key.clone(), Some(why)));
                     }
                 }
@@ -302,7 +301,7 @@ impl Hub {
                     .map(|it| it.at.max(deal.since));
                 if heard.is_some_and(|at| now.saturating_sub(at) > PERFORMER_TIMEOUT) {
                     let why = format!(
-                        "{performer} is lost: nothing was heard of it for {} s",
+                        "{performer} is lost: no message from it for {} s",
                         PERFORMER_TIMEOUT.as_secs()
                     );
                     lost.push((key.clone(), Some(why)));
@@ -326,7 +325,7 @@ impl Hub {
 
     fn no_performer_message(&self, now: Duration) -> String {
         format!(
-            "no performer answered within {} s; performers that were heard: {}",
+            "no performer answered within {} s; discovered performers: {}",
             REQUEST_TIMEOUT.as_secs(),
             self.listed(now)
         )

@@ -214,7 +214,7 @@ impl ProblemSync {
                             }
                         }
                         Err(why) => self.remarks.push(format!(
-                            "the problem expert does not take {}: {why}",
+                            "the problem expert rejects {}: {why}",
                             writing.key.to_pddl(writing.value)
                         )),
                     }
@@ -363,7 +363,8 @@ impl ProblemSync {
                 self.sync_state = SyncState::Disabled;
                 self.pending_writes.clear();
                 self.remarks.push(
-                    "the problem expert has nothing of this problem, and is left alone".to_owned(),
+                    "the problem expert contains nothing of this problem, and is not used"
+                        .to_owned(),
                 );
                 return;
             }

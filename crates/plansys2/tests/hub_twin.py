@@ -1,5 +1,7 @@
-"""Plays scripts to the `Hub` of `examples/plansys2_world.py`: each line of the input is a script, a JSON list of what
-happens; each line of the output has what the hub did at each of them."""
+"""Plays scripts to the `Hub` of `examples/plansys2_world.py`.
+
+Each line of the input is a script: a JSON list of events. Each line of the output lists the hub's reactions to them.
+"""
 
 import json
 import os

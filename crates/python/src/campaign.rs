@@ -61,7 +61,7 @@ impl Experiment {
         run_without_gil(py, || {
             let file = |name: &str| {
                 let text = files.get(name).cloned();
-                text.ok_or_else(|| format!("the file {name} was not given with the experiment"))
+                text.ok_or_else(|| format!("the file {name} is missing from the experiment"))
             };
             let experiment = AnyExperiment::read(&Source::new(name, text), &file)?;
             Ok(Self { experiment })
@@ -87,7 +87,7 @@ impl Experiment {
             let (shard, shards) = part;
             if shard >= shards {
                 return Err(CallError::Request(format!(
-                    "there is no part {shard} of {shards}; the parts are 0 to {}",
+                    "part {shard} of {shards} does not exist; expected 0 to {}",
                     shards.saturating_sub(1)
                 )));
             }

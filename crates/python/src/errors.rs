@@ -128,11 +128,7 @@ fn bug(py: Python<'_>, panic: &(dyn Any + Send)) -> PyErr {
         .downcast_ref::<String>()
         .map(String::as_str)
         .or_else(|| panic.downcast_ref::<&str>().copied());
-    exception(
-        py,
-        "BugError",
-        (said.unwrap_or("it says nothing").to_owned(),),
-    )
+    exception(py, "BugError", (said.unwrap_or("no message").to_owned(),))
 }
 
 fn exception<'py, A>(py: Python<'py>, name: &str, arguments: A) -> PyErr

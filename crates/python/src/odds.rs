@@ -73,8 +73,8 @@ fn executors(names: &[String]) -> Result<Vec<ExecutorSpec>, CallError> {
     let read: Vec<_> = read.collect::<Result<_, _>>().map_err(CallError::request)?;
     match read.iter().find(|spec| spec.needs_comparator()) {
         Some(odd) => Err(CallError::Request(format!(
-            "`{odd}` compares plans while it executes one, which is not sampled here; leave out the \
-             number, or use `compare`"
+            "`{odd}` compares plans during the execution, which `odds` does not sample; leave out \
+             the number, or use `compare`"
         ))),
         None => Ok(read),
     }

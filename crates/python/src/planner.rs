@@ -42,7 +42,7 @@ impl PyPlanner {
             match said.and_then(|said| said.extract::<Option<String>>(py)) {
                 Ok(said) => Ok(said),
                 Err(error) => {
-                    let why = format!("the planner has failed: {error}");
+                    let why = format!("the planner failed: {error}");
                     if error.is_instance_of::<PyKeyboardInterrupt>(py) {
                         self.interrupted.store(true, Ordering::Relaxed);
                     } else {
@@ -55,7 +55,7 @@ impl PyPlanner {
         })?;
         let Some(said) = said else {
             return Ok(PlanAnswer::NotFound {
-                why: "the planner has no plan".to_owned(),
+                why: "the planner found no plan".to_owned(),
             });
         };
         let plan = pddl::read_plan(&Source::new("plan of the planner", said), question.task());
@@ -65,7 +65,7 @@ impl PyPlanner {
             Verdict::Valid(_) => Ok(PlanAnswer::Plan(plan)),
             Verdict::Invalid(wrong) => Err(format!("the planner's plan does not work: {wrong}")),
             Verdict::Undecided(why) => Err(format!(
-                "it is undecided whether the planner's plan is valid: {why}"
+                "the validity of the planner's plan is undecided: {why}"
             )),
         }
     }

@@ -357,8 +357,8 @@ impl Task {
         match self.any_plan_by(plan, rule)? {
             AnyPlan::TimeTriggered(plan) => Ok(plan),
             AnyPlan::Stn(_) => Err(CallError::Request(format!(
-                "{name} is an STN plan, which stands for many plans; give a plan with fixed times, \
-                 or ask for the envelope of this one"
+                "{name} is an STN plan without fixed times; give a plan with fixed times, or \
+                 compute the envelope of this one"
             ))),
         }
     }
@@ -381,7 +381,8 @@ pub(crate) fn threads(
 ) -> Result<usize, CallError> {
     if jobs.is_some() && !is_embedded {
         return Err(CallError::request(
-            "`jobs` says how many threads the embedded planner uses; another one has its own settings",
+            "`jobs` is the number of threads of the embedded planner; other planners have their \
+             own settings",
         ));
     }
     Ok(match jobs.unwrap_or(usual) {

@@ -307,5 +307,5 @@ def test_search_for_plans_without_time_says_so() -> None:
     assert list(plans) == []
     assert not plans.answer
     assert plans.answer.document["stop"] == "time limit"
-    with pytest.raises(ValueError, match="time limit of -1"):
+    with pytest.raises(ValueError, match="time limit is -1"):
         errand().plans(time_limit=-1)

@@ -126,7 +126,7 @@ def test_goal_is_not_achieved_before_its_release_time() -> None:
         (HOME, {"deadline": 900, "within": 5}, "leave out one"),
         (HOME, {"after": 0}, "not positive"),
         (HOME, {"release": 900, "within": 5}, "give both"),
-        (HOME, {"by": ""}, "no name of a client"),
+        (HOME, {"by": ""}, "invalid name of a client"),
     ],
 )
 def test_wrong_goals_are_refused(goal: str, options: dict[str, Any], words: str) -> None:
@@ -157,7 +157,7 @@ def test_unknown_names_are_refused() -> None:
     ("options", "words"),
     [
         ({"executor": "live:5"}, "needs a model of the world"),
-        ({"learn": "experience"}, "the run has none"),
+        ({"learn": "experience"}, "the run has no journal"),
         ({"executor": "nobody"}, "nobody"),
         ({"planner": lambda domain, problem: None}, "planner"),
         ({"planning_time": 1}, "planning"),

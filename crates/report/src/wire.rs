@@ -64,7 +64,7 @@ pub fn field_text<'a>(message: &'a Value, name: &str) -> Result<&'a str, WireErr
         .ok_or_else(|| invalid_message(format!("`{name}` is missing")))?;
     value
         .as_str()
-        .ok_or_else(|| invalid_message(format!("`{name}` must be a text")))
+        .ok_or_else(|| invalid_message(format!("`{name}` must be a string")))
 }
 
 /// Writes a command.
@@ -139,8 +139,8 @@ pub fn read_observation(message: &Value, task: &Task) -> Result<Observation, Wir
         },
         other => {
             return Err(invalid_message(format!(
-                "`{other}` is no type of observation: started, ended, feedback, \
-                 fact, value"
+                "unknown type of observation `{other}`; expected started, ended, feedback, fact or \
+                 value"
             )));
         }
     };
@@ -171,7 +171,7 @@ fn ending(message: &Value) -> Result<Ending, WireError> {
         "cancelled" => Ending::Cancelled,
         other => {
             return Err(invalid_message(format!(
-                "`{other}` is no outcome: succeeded, failed, cancelled"
+                "unknown outcome `{other}`; expected succeeded, failed or cancelled"
             )));
         }
     })
@@ -183,7 +183,7 @@ fn read_amounts(message: &Value, task: &Task) -> Result<Vec<Measured>, WireError
     };
     let entries = measured
         .as_object()
-        .ok_or_else(|| invalid_message("`measured` must be an object: fluent to amount"))?;
+        .ok_or_else(|| invalid_message("`measured` must be an object from fluents to amounts"))?;
     let read = |(name, value): (&String, &Value)| {
         let fluent = task.fluent_named(name);
         Ok(Measured {

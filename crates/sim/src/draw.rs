@@ -132,7 +132,7 @@ impl Distribution {
             Self::Triangular { from, mode, to }
                 if !finite(&[*from, *mode, *to]) || from > mode || mode > to =>
             {
-                "it must be that from <= mode <= to"
+                "expected from <= mode <= to"
             }
             Self::Exponential { from, mean } if !finite(&[*from, *mean]) || *mean < 0.0 => {
                 "the mean of the added delay must not be negative"
@@ -143,7 +143,7 @@ impl Distribution {
                 "shape and scale must be greater than 0"
             }
             Self::Empirical(values) if values.is_empty() || !finite(values) => {
-                "the list must have at least one value, and finite ones only"
+                "the list must have at least one value, and only finite values"
             }
             _ => return None,
         };

@@ -162,7 +162,7 @@ fn opposite(event: &Event) -> Event {
     let failed = |ticket: ActionHandle| Event::Ended {
         ticket,
         ending: Ending::Failed {
-            why: "so it is said".to_owned(),
+            why: "reported as failed".to_owned(),
         },
         measured: Vec::new(),
     };

@@ -52,9 +52,9 @@ impl ActionPattern {
             None => (text, false),
         };
         let mut words = inner.split_whitespace().map(str::to_ascii_lowercase);
-        let name = words.next().ok_or_else(|| {
-            format!("`{text}` names nothing; write a name, `(name _ object)` or `*`")
-        })?;
+        let name = words
+            .next()
+            .ok_or_else(|| format!("expected a name, `(name _ object)` or `*`, found `{text}`"))?;
         let arguments: Vec<Option<String>> =
             words.map(|word| (word != "_").then_some(word)).collect();
         if !has_arguments && !arguments.is_empty() {
@@ -72,7 +72,7 @@ impl ActionPattern {
             .flatten()
             .find(|object| problem.object(object).is_none())
         {
-            return Err(format!("there is no object `{unknown}`"));
+            return Err(format!("unknown object `{unknown}`"));
         }
         Ok(Self {
             name: Some(name),

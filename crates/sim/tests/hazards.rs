@@ -111,7 +111,7 @@ fn last_matching_hazard_applies_and_unreported_changes_are_silent() {
 fn rate_errors_have_line_and_advice() {
     let task = task();
     let cases = [
-        ("fact = \"open\"", 3, "say how often"),
+        ("fact = \"open\"", 3, "expected a rate"),
         (
             "fact = \"open\"\nbecomes_true_per_second = -1",
             5,

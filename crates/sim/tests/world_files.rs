@@ -43,7 +43,7 @@ fn each_error_has_line_and_advice() {
         (
             "[[duration]]\naction = \"(go c)\"\nconstant = 1\n",
             4,
-            "no object `c`",
+            "unknown object `c`",
         ),
         (
             "[[duration]]\naction = \"(go a b)\"\nconstant = 1\n",
@@ -53,7 +53,7 @@ fn each_error_has_line_and_advice() {
         (
             "[[duration]]\naction = \"go\"\n",
             3,
-            "how it is distributed",
+            "expected a distribution",
         ),
         (
             "[[duration]]\naction = \"go\"\nconstant = 1\nvalues = [1]\n",
@@ -100,7 +100,7 @@ fn each_error_has_line_and_advice() {
         (
             "[[failure]]\naction = \"go\"\nprobability = 1\nwhen = \"start\"\nundone = true\n",
             7,
-            "nothing to undo",
+            "no effects to undo",
         ),
         (
             "[[event]]\nfact = \"(at _)\"\nbecomes = true\nconstant = 1\n",
@@ -174,7 +174,7 @@ fn unknown_keys_are_rejected() {
         (
             "[[amount]]\naction = \"fill\"\nfluent = \"charge\"\nconstant = 1\n",
             5,
-            "no such fluent",
+            "does not change this fluent",
         ),
         (
             "[[amount]]\naction = \"*\"\nfluent = \"level\"\nconstant = 1\n",
@@ -268,7 +268,7 @@ fn invalid_outcomes_are_rejected() {
         (
             "probability = 1\nbecomes_true = [\"(at c)\"]\n",
             8,
-            "no object `c`",
+            "unknown object `c`",
         ),
         (
             "probability = 1\nbecomes_true = [\"(at _)\"]\n",

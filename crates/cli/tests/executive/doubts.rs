@@ -51,7 +51,7 @@ fn doubt_is_listed_and_settled_by_a_fact() {
         "{state}"
     );
     let why = state["why"].as_str().expect("words");
-    assert!(why.contains("so in doubt: (waiting box)"), "{why}");
+    assert!(why.contains("therefore in doubt: (waiting box)"), "{why}");
     assert_eq!(state["facts"], json!([]), "{state}");
     let shown = ctl(&["--to", &own.address(), "state"]);
     let shown = String::from_utf8_lossy(&shown.stdout).into_owned();

@@ -138,7 +138,7 @@ fn ended(line: &[&str]) -> (Option<i32>, String) {
 #[test]
 fn ctl_events_reports_reason_of_rejection() {
     let refusal =
-        json!({"error": "the lines up to 7 are no longer kept here", "help": "ask for later ones"});
+        json!({"error": "the lines up to 7 are no longer in memory", "help": "ask for later ones"});
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port is free");
     let address = listener.local_addr().expect("it has one").to_string();
     let body = refusal.to_string();
@@ -155,7 +155,7 @@ fn ctl_events_reports_reason_of_rejection() {
     let said = String::from_utf8_lossy(&done.stderr).into_owned();
     assert_eq!(done.status.code(), Some(2), "{said}");
     for words in [
-        "the lines up to 7 are no longer kept here",
+        "the lines up to 7 are no longer in memory",
         "ask for later ones",
     ] {
         assert!(said.contains(words), "{said}");

@@ -70,7 +70,7 @@ fn goals_with_deadlines_are_achieved_or_fail() {
     let (_, refusal) = own.post("/v1/goals", &past);
     let refusal = refusal.to_string();
     assert!(
-        refusal.contains("the deadline has passed: it is") && refusal.contains("s later"),
+        refusal.contains("the deadline has passed: the time is") && refusal.contains("s later"),
         "{refusal}"
     );
     let both = json!({"goal": "(done b2)", "within": 5, "deadline": 1_000_000});
@@ -94,7 +94,7 @@ fn goals_with_release_times_are_queued_until_then() {
     let own = simulated("released");
     own.await_state(|state| state["activity"] == "resting");
     for (wrong, words) in [
-        (json!({"after": 0}), "is not positive"),
+        (json!({"after": 0}), "must be positive"),
         (
             json!({"after": 5, "release": 1_000_000}),
             "leave out one of them",
@@ -109,8 +109,8 @@ fn goals_with_release_times_are_queued_until_then() {
             "not later than the release time",
         ),
         (json!({"release": "soon"}), "number"),
-        (json!({"by": ""}), "no name of a client"),
-        (json!({"by": "a\nb"}), "no name of a client"),
+        (json!({"by": ""}), "invalid name of a client"),
+        (json!({"by": "a\nb"}), "invalid name of a client"),
     ] {
         let mut goal = wrong.clone();
         goal["goal"] = json!("(done b2)");

@@ -16,9 +16,11 @@ pub(crate) fn main(arguments: &[String]) -> Result<(), String> {
     let [domain, problem, seconds, megabytes] = arguments else {
         return Err("embedded DOMAIN PROBLEM SECONDS MB".to_owned());
     };
-    let limit: u64 = seconds.parse().map_err(|_| "no number of seconds")?;
+    let limit: u64 = seconds
+        .parse()
+        .map_err(|_| "expected a number of seconds")?;
     let limit = Duration::from_secs(limit);
-    let megabytes: usize = megabytes.parse().map_err(|_| "no number of MB")?;
+    let megabytes: usize = megabytes.parse().map_err(|_| "expected a number of MB")?;
     let source = |path: &String| {
         let bytes = std::fs::read(Path::new(path)).map_err(|error| format!("{path}: {error}"))?;
         Ok::<_, String>(Source::from_bytes(path.as_str(), &bytes))

@@ -45,7 +45,10 @@ fn main() -> ExitCode {
         "run" => run::main(&rest),
         "table" => table::main(&rest),
         "embedded" => embedded::main(&rest),
-        _ => Err("the first word is `run` or `table`; the source says what follows".to_owned()),
+        _ => Err(
+            "expected `run` or `table` as the first word; see the source for the options"
+                .to_owned(),
+        ),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

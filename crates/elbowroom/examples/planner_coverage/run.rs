@@ -115,10 +115,10 @@ fn options(arguments: &[String]) -> Result<Options, String> {
         }
         let value = arguments
             .next()
-            .ok_or_else(|| format!("{option} takes a value"))?;
+            .ok_or_else(|| format!("{option} needs a value"))?;
         let number = || {
             let number: Result<usize, _> = value.parse();
-            number.map_err(|_| format!("{option} takes a number, not {value}"))
+            number.map_err(|_| format!("{option} expects a number, found {value}"))
         };
         match option.as_str() {
             "--data" => options.data = PathBuf::from(value),
@@ -134,7 +134,7 @@ fn options(arguments: &[String]) -> Result<Options, String> {
         }
     }
     if options.planners.is_empty() || options.output.as_os_str().is_empty() {
-        return Err("name at least one --planner, and a file with -o".to_owned());
+        return Err("expected at least one --planner, and a file with -o".to_owned());
     }
     Ok(options)
 }

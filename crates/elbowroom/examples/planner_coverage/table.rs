@@ -90,14 +90,14 @@ fn table(rows: &[Row], has_scores: bool) -> String {
         }
     }
     text.push_str(
-        "\nSolved: instances with a plan that the judge accepts. First plan: the median of the \
+        "\nSolved: instances with a plan that the validator accepts. First plan: the median of the \
          seconds to it,\nprocess start included.",
     );
     if has_scores {
         text.push_str(
             " Score: the sum, over the instances it solved, of the best value of the metric\n(the \
-             makespan, where there is none) that any planner here found divided by its own, or \
-             the other way round\nwhere more is better.",
+             makespan without one) that any planner in the table found, divided by its own, or the \
+             inverse\nif greater is better.",
         );
     }
     text.push_str("\n\n");
@@ -193,7 +193,7 @@ fn outcomes(results: &Results<'_>) -> String {
     for name in names {
         count_line(name, &|row| usize::from(row.outcome == name));
     }
-    count_line("plans refused by the judge", &|row| {
+    count_line("plans rejected by the validator", &|row| {
         row.refused.parse().unwrap_or(0)
     });
     count_line("plans whose times were repaired", &|row| {
@@ -217,14 +217,15 @@ fn contradictions(results: &Results<'_>) -> String {
             for row in says_no.filter(|_| is_solved) {
                 let _ = writeln!(
                     text,
-                    "- {} says that {domain} {instance} has no plan, and another planner has one",
+                    "- {} reports that {domain} {instance} has no plan, but another planner found \
+                     one",
                     row.planner
                 );
             }
         }
     }
     if text.is_empty() {
-        "\nNo planner denied an instance that another one solved.\n".to_owned()
+        "\nNo planner reported an instance as unsolvable that another one solved.\n".to_owned()
     } else {
         format!("\n{text}")
     }

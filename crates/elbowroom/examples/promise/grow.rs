@@ -42,7 +42,7 @@ pub(crate) fn main(options: &Options) {
         row(source, options).map(|row| (source.family.clone(), row))
     });
     println!(
-        "| family | plans | free ends | no schedule | broken | nobody could know | spoiler beats {} \
+        "| family | plans | free ends | no schedule | broken | no executor could know | spoiler beats {} \
          | accepted |",
         EXECUTORS.join(" | ")
     );

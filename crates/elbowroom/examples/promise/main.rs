@@ -63,7 +63,7 @@ fn main() -> ExitCode {
             "boxes" => boxes::main,
             _ => {
                 return Err(
-                    "the first word says what to do: plan, nominal, runs, grow or boxes".to_owned(),
+                    "expected plan, nominal, runs, grow or boxes as the first word".to_owned(),
                 );
             }
         };

@@ -41,10 +41,10 @@ impl Options {
         while let Some(option) = arguments.next() {
             let value = arguments
                 .next()
-                .ok_or_else(|| format!("{option} takes a value"))?;
+                .ok_or_else(|| format!("{option} needs a value"))?;
             let number = || {
                 let number: Result<u64, _> = value.parse();
-                number.map_err(|_| format!("{option} takes a number, not {value}"))
+                number.map_err(|_| format!("{option} expects a number, found {value}"))
             };
             match option.as_str() {
                 "--data" => options.data = PathBuf::from(value),

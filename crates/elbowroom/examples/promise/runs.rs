@@ -32,7 +32,7 @@ pub(crate) fn main(options: &Options) {
     for kind in [Kind::Outside, Kind::LateLook] {
         let counts = all.iter().filter_map(|tally| tally.counts.get(&kind));
         let given_up: u64 = counts.map(|count| count.given_up).sum();
-        println!("{}: given up {given_up} times.", kind.name());
+        println!("{}: abandoned {given_up} times.", kind.name());
     }
 }
 

@@ -47,7 +47,7 @@ impl Subject {
     ) -> Result<Self, String> {
         let text = |what: &str, text: &str| pddl::Source::new(what, text);
         let read = read_problem(&text("domain", domain), &text("problem", problem));
-        let (problem, _) = read.map_err(|_| "refused by the reader of problems".to_owned())?;
+        let (problem, _) = read.map_err(|_| "rejected by the reader of problems".to_owned())?;
         let task = Task::new(problem);
         Self::of_bytes([family, name], task, plan.as_bytes())
     }
@@ -70,7 +70,7 @@ impl Subject {
             PlanKind::TimeTriggered => {
                 let text = pddl::Source::from_bytes("plan", bytes);
                 let read = RoundingRule::default().read_plan(&text, &task);
-                read.map_err(|_| "refused by the reader of plans")?.0
+                read.map_err(|_| "rejected by the reader of plans")?.0
             }
             PlanKind::Stn => scheduled(bytes, &task)?,
         };
@@ -78,8 +78,8 @@ impl Subject {
             return Err("an empty plan".to_owned());
         }
         let freed = pipeline::free(&task, &plan).map_err(|error| match error {
-            pipeline::PipelineError::Invalid(_) => "the judge rejects the plan".to_owned(),
-            _ => "the plan cannot be freed".to_owned(),
+            pipeline::PipelineError::Invalid(_) => "the validator rejects the plan".to_owned(),
+            _ => "the plan cannot be relaxed".to_owned(),
         })?;
         Ok(Self {
             family: family.to_owned(),
@@ -120,7 +120,7 @@ impl Subject {
 
 /// Returns the earliest schedule of an STN plan file at its nominal values.
 fn scheduled(bytes: &[u8], task: &Task) -> Result<TimeTriggeredPlan, String> {
-    let plan = format::read(bytes, task).map_err(|_| "refused by the reader of STN plans")?;
+    let plan = format::read(bytes, task).map_err(|_| "rejected by the reader of STN plans")?;
     let plan = plan.plan.at(&plan.nominal());
     let network = stn::ConsistentNetwork::try_from(plan.network(&Valuation::default()));
     let network = network.map_err(|_| "an STN plan without a schedule")?;
@@ -135,10 +135,10 @@ pub(crate) fn task(domain: &Path, problem: &Path) -> Result<Task, String> {
         Ok::<_, String>(pddl::Source::from_bytes(path.display().to_string(), &bytes))
     };
     let read = read_problem(&source(domain)?, &source(problem)?);
-    let (problem, _) = read.map_err(|_| "refused by the reader of problems".to_owned())?;
+    let (problem, _) = read.map_err(|_| "rejected by the reader of problems".to_owned())?;
     Ok(Task::new(problem))
 }
 
 fn read(path: &Path) -> Result<Vec<u8>, String> {
-    fs::read(path).map_err(|_| "a file that is not there".to_owned())
+    fs::read(path).map_err(|_| "a missing file".to_owned())
 }

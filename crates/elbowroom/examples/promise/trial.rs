@@ -157,7 +157,7 @@ impl<'a> Ready<'a> {
         let outcome = self.outcome(&report);
         let is_in_vain = executor == "live" && course.is_given_up_in_vain(&self.subject.task);
         let failure = match outcome.failure {
-            Some(_) if is_in_vain => Some("gives up a plan that works"),
+            Some(_) if is_in_vain => Some("abandons a plan that works"),
             failure => failure.filter(|_| course.is_promised(weakest)),
         };
         let why = outcome.why;

@@ -51,7 +51,7 @@ impl Kind {
             Self::Spoiler => "spoiler",
             Self::Late => "late start",
             Self::Outside => "one outside",
-            Self::LateLook => "late look",
+            Self::LateLook => "late check",
         }
     }
 }

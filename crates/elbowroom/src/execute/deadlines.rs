@@ -30,7 +30,8 @@ pub fn obstacle_to_deadline(task: &Task, goal: &Condition) -> Option<String> {
 fn obstacle_of_fact(task: &Task, fact: ground::FactId) -> Option<String> {
     let name = task.fact_name(fact);
     if task.is_derived(fact) {
-        let why = format!("`{name}` follows from other facts, so the goal cannot have a deadline");
+        let why =
+            format!("`{name}` is derived from other facts, so the goal cannot have a deadline");
         return Some(why);
     }
     let (predicate, _) = task.atom(fact);

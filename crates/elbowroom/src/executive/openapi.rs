@@ -156,7 +156,7 @@ pub const METHODS: &[Method] = &[
     change(
         "POST",
         "/v1/pause",
-        "Stops dispatching; running actions continue",
+        "No further actions are started; running actions continue",
         None,
     ),
     change("POST", "/v1/resume", "Ends a pause", None),

@@ -115,7 +115,7 @@ fn requests_during_search_are_handled_at_once() {
     assert_has(
         &told,
         &[
-            "3: it is no goal of this problem",
+            "3: it is not a valid goal of this problem",
             "30: the plan is there",
             "30: plan, because the goals have changed",
             "30: start (fetch r book)",

@@ -101,7 +101,7 @@ fn requests_during_preparation_are_handled_at_once() {
         (7, Event::Asked(Request::Resume)),
     ];
     let told = run(&task, 200, script, &planner);
-    assert_has(&told, &["3: it is no goal", "rest: goal-reached"]);
+    assert_has(&told, &["3: it is not a valid goal", "rest: goal-reached"]);
     let place = |what: &str| told.lines.iter().position(|it| it.contains(what));
     let taken_up = place("\"event\":\"plan\"");
     assert!(taken_up.is_some());

@@ -171,7 +171,7 @@ fn dead_end_names_unreachable_fact_and_time() {
     assert_eq!(reason.cause, Cause::NeverAgain);
     assert_eq!(
         reason.to_string(),
-        "(picked) can never become true again, since 10 (behind it: (pick) failed: it broke \
+        "(picked) can never become true again, since 10 (cause: (pick) failed: it broke \
          down)"
     );
 }
@@ -206,7 +206,7 @@ fn dead_end_is_detected_for_every_cause() {
     if !reasons.is_empty() {
         assert_eq!(
             reasons,
-            ["(lit) can never become true again, since 25 (behind it: (open) became false)"]
+            ["(lit) can never become true again, since 25 (cause: (open) became false)"]
         );
     }
     assert_ne!(report.verdict, Verdict::GoalReached);

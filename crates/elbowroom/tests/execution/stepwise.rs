@@ -223,7 +223,7 @@ fn unrequested_input_is_rejected_without_effect() {
     };
     let refused: Result<(), UnexpectedAnswer> = run.observe(early);
     let words = refused.expect_err("nothing was asked").to_string();
-    assert!(words.contains("has not asked for time to pass"), "{words}");
+    assert!(words.contains("has not requested time to pass"), "{words}");
     while let Next::Command(command) = next_of_the_world(&mut run, &mut *workers) {
         world.push(command);
     }

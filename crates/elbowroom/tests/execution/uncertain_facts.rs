@@ -191,9 +191,12 @@ fn run_ends_with_unresolvable_doubt_as_reason() {
         let Verdict::NoPlan { why, .. } = &report.verdict else {
             panic!("{executor}: {report:#?}");
         };
-        assert!(why.contains("so in doubt: (in x)"), "{executor}: {why}");
         assert!(
-            why.contains("whether (pick r1 x) has come to its end"),
+            why.contains("therefore in doubt: (in x)"),
+            "{executor}: {why}"
+        );
+        assert!(
+            why.contains("whether (pick r1 x) has ended"),
             "{executor}: {why}"
         );
         let refused = report

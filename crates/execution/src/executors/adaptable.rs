@@ -28,9 +28,9 @@ pub(super) const REGISTERED: ExecutorEntry = ExecutorEntry {
     name: "adaptable",
     argument: None,
     is_optional: false,
-    summary: "Executes the order of the plan's actions that is most likely to succeed from \
-              the present state: it skips, repeats and reorders actions where that is \
-              likelier and there is time for it, and replans when no order can work.",
+    summary: "Executes the order of the plan's actions that is most likely to succeed from the \
+              present state: it skips, repeats and reorders actions where that is more likely to \
+              succeed and time permits, and replans when no order reaches the goal.",
     paper: "Olisipo in Ribeiro et al. (2021), sections 2.2.1 and 2.2.2",
     need: PlanForm::PartialOrder,
     make: |_, means| {

@@ -15,8 +15,8 @@ pub(super) const REGISTERED: ExecutorEntry = ExecutorEntry {
     argument: Some("percentage of the planned value"),
     is_optional: false,
     summary: "Dispatches the plan and replans when a duration or an amount leaves the planned \
-              value by more than X %. It looks no further than the constraints at each time \
-              point, and notices a missed deadline only there.",
+              value by more than X %. It checks only the constraints of the next time point, so \
+              that it notices a missed deadline late.",
     paper: "BLEX(X) in Cashmore et al. (2020), section 5",
     need: PlanForm::Orderings,
     make: |argument, _| Box::new(Fixed::new(&argument.unwrap_or_default())),

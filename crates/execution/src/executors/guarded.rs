@@ -16,9 +16,9 @@ pub(super) const REGISTERED: ExecutorEntry = ExecutorEntry {
     name: "guarded",
     argument: None,
     is_optional: false,
-    summary: "Dispatches so that the plan works whatever happens within its envelope, and replans as \
-              soon as an observed quantity leaves its interval, a running action outlives its \
-              upper end, or too little time is left. Where only a start is late, it goes on with a \
+    summary: "Dispatches so that the plan works for all values inside its envelope, and replans as \
+              soon as an observed quantity leaves its interval, a running action exceeds its upper \
+              bound, or too little time is left. If only a start is late, it continues with a \
               smaller envelope, if there is one.",
     paper: "DREEX, Algorithm 2 in Cashmore et al. (2020)",
     need: PlanForm::Envelope,

@@ -32,16 +32,15 @@ pub(super) const REGISTERED: ExecutorEntry = ExecutorEntry {
     name: "live",
     argument: Some("number of percentage points"),
     is_optional: true,
-    summary: "Dispatches so that the rest of the plan works whatever happens within its envelope. \
-              When a value leaves it, gives the strongest guarantee that still holds for the rest, \
-              with the observed values fixed, and replans only when the rest does not work even if \
-              nothing deviates any more. Where time is lacking or numbers fall short, and no other \
-              plan is found, it carries on by the plan's orderings, without a guarantee, as \
-              `esterel` does; likewise with a plan that is made again after durations have broken \
-              it twice. With a \
-              number, it also replans while no action is running and another plan is more likely \
-              to succeed, by at least that number of percentage points, in the world that the \
-              world file describes.",
+    summary: "Dispatches so that the remaining plan works for all values inside its envelope. When \
+              a value leaves it, `live` computes the strongest guarantee that still holds for the \
+              remaining plan, with the observed values fixed. It replans only when the remaining \
+              plan fails even without further deviations. If time or a number is insufficient and \
+              no other plan is found, it continues by the plan's orderings, without a guarantee, \
+              as `esterel` does; likewise with a plan that is found again after durations have \
+              broken it twice. With a number, it also replans while no action is running and \
+              another plan is more likely to succeed, by at least that number of percentage \
+              points, in the world that the world file describes.",
     paper: "goes beyond Cashmore et al. (2020)",
     need: PlanForm::OpenNetwork,
     make: |argument, means| {

@@ -15,11 +15,11 @@ pub(super) const REGISTERED: ExecutorEntry = ExecutorEntry {
     name: "lookahead",
     argument: None,
     is_optional: false,
-    summary: "Chooses each start so that success is most likely, counting retries and \
-              detours, whether or not the action is in the plan. This needs a small world \
-              without numbers and timed initials, in which nothing has to be done before \
-              something else ends. In other worlds it acts like `adaptable`, but chooses the \
-              most likely order again before each start if the plan is short.",
+    summary: "Chooses each start so that success is most likely, including retries and detours, \
+              whether or not the action is in the plan. This needs a small world without numbers \
+              and timed initials, in which no action has to end while another one is running. In \
+              other worlds it acts like `adaptable`, but chooses the most likely order again \
+              before each start if the plan is short.",
     paper: "goes beyond Ribeiro et al. (2021)",
     need: PlanForm::PartialOrder,
     make: |_, means| {

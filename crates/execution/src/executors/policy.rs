@@ -27,13 +27,14 @@ pub(super) const REGISTERED: ExecutorEntry = ExecutorEntry {
     name: "policy",
     argument: None,
     is_optional: false,
-    summary: "Follows the plan as `live` does while that costs next to no probability of reaching the \
-              goal in time, and from then on makes the move of which the goal is most likely: an action, \
-              letting one go, or waiting, whether or not it is in the plan. What moves are worth comes from \
-              what is known of the world's distributions of durations, failures and events, not from what \
-              will happen. Where the world is too large for that, it tries out in samples of the world, whenever \
-              something happens, what comes of going on, of handing what is left of the plan to `adaptable` \
-              or `esterel`, of another plan, and of waiting.",
+    summary: "Follows the plan as `live` does while that costs almost no probability of reaching \
+              the goal in time, and then chooses the move with the highest success probability: to \
+              start an action, to cancel one, or to wait, whether or not it is in the plan. It \
+              computes these probabilities from the known distributions of durations, failures and \
+              events, without knowledge of the future. If the world is too large for that, it \
+              compares alternatives in samples of the world at each event: to continue, to execute \
+              the remaining plan as `adaptable` or `esterel` does, to adopt another plan, and to \
+              wait.",
     paper: "the policy of a semi-Markov decision process (Howard, 1971); without it, the rollout algorithm \
             (Bertsekas, Tsitsiklis & Wu, 1997); goes beyond both papers",
     need: PlanForm::OpenNetwork,

@@ -118,7 +118,7 @@ impl fmt::Display for Subject {
             Self::OverAllConditions(conditions) => {
                 return write!(f, "{} throughout", conditions.join(" and "));
             }
-            Self::GoalObservation => "what the world looks like at the end",
+            Self::GoalObservation => "the observation of the final state",
             Self::AnyObservation => "something is observed",
             Self::LastGoalTimedInitial => "the last timed initial that the goal depends on",
             Self::EndOfRunningActions => "the running actions have ended",
@@ -127,16 +127,10 @@ impl fmt::Display for Subject {
             Self::NextStart => "the order's next start",
             Self::NextHappening => "the next step of the order has happened",
             Self::BestChoice(probability) => {
-                return write!(
-                    f,
-                    "best of all that can be done (P = {probability:.4} from here)"
-                );
+                return write!(f, "best of all moves (P = {probability:.4} from here)");
             }
             Self::NextEvaluation(probability) => {
-                return write!(
-                    f,
-                    "the next moment at which moves are weighed (P = {probability:.4} from here)"
-                );
+                return write!(f, "the next decision time (P = {probability:.4} from here)");
             }
             Self::FirstInBestOrder(probability) => {
                 return write!(
@@ -149,7 +143,8 @@ impl fmt::Display for Subject {
                 let percent = |share: &Rational| (share * Rational::from(100)).to_decimal(1);
                 return write!(
                     f,
-                    "another plan succeeds with a probability of {} %, the rest of this one of {} %",
+                    "another plan succeeds with a probability of {} %, the rest of this one with \
+                     {} %",
                     percent(other),
                     percent(present)
                 );
@@ -166,18 +161,19 @@ impl fmt::Display for Subject {
                 let why = why.as_deref().unwrap_or("it was cancelled");
                 return write!(
                     f,
-                    "{why}; {failures} in a row, and it starts with probability {success}"
+                    "{why}; {failures} failures in a row, although each start succeeds with \
+                     probability {success}"
                 );
             }
             Self::NoPlan => "there is no plan",
             Self::NoEnvelope => "the plan has no envelope",
-            Self::NoPartialOrder => "the plan was made ready without its partial order",
+            Self::NoPartialOrder => "the plan was prepared without its partial order",
             Self::NoSchedule => "no times satisfy the plan's constraints",
-            Self::UnsatisfiableConstraint => "nothing satisfies a constraint",
+            Self::UnsatisfiableConstraint => "a constraint cannot be satisfied",
             Self::Nothing => "the plan waits for nothing",
-            Self::InsufficientTime => "even if nothing deviates any more, too little time is left",
+            Self::InsufficientTime => "even without further deviations, too little time is left",
             Self::NumericConditionsWhenLonger => {
-                "after more than that, what the rest of the plan does to numbers fails"
+                "if it takes longer, numeric conditions of the remaining plan fail"
             }
         };
         f.write_str(words)
@@ -186,7 +182,7 @@ impl fmt::Display for Subject {
 
 fn format_retry(f: &mut fmt::Formatter<'_>, of: Option<&str>, failures: u32) -> fmt::Result {
     if let Some(of) = of {
-        write!(f, "{of} is tried again: ")?;
+        write!(f, "{of} is retried: ")?;
     }
     match failures {
         1 => f.write_str("its start has failed once"),

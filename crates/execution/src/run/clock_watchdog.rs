@@ -73,8 +73,8 @@ impl ClockWatchdog {
                 format!("; its last message could not be parsed: `{said}`: {why}")
             });
         Err(format!(
-            "its clock stands still: {most} answers have brought it from {} to {} only; when \
-             nothing happens, time must pass until the moment that was asked for{hint}",
+            "its clock does not advance: after {most} answers it has gone from {} to {} only; \
+             without events, it must advance to the requested time{hint}",
             self.since.to_f64(),
             now.to_f64(),
         ))

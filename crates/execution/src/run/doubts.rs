@@ -77,7 +77,7 @@ impl Run<'_> {
             self.plan_events.push(PlanEvent::Value(fluent));
         }
         self.record_unexpected_event();
-        Some("it had timed out; its effects are known now")
+        Some("it had timed out; its effects are now known")
     }
 
     /// Asks the world about doubtful facts and values before a plan is requested, unless it was
@@ -178,7 +178,10 @@ impl Run<'_> {
         let doubts = by_doubt.iter().map(|(doubt, names)| {
             let (since, action) = (doubt.since.to_decimal(3), &doubt.action);
             let names = names.join(", ");
-            format!("since {since} it is unknown whether {action} has come to its end, so in doubt: {names}")
+            format!(
+                "since {since} it is unknown whether {action} has ended; therefore in doubt: \
+                     {names}"
+            )
         });
         doubts.collect::<Vec<_>>().join("; ")
     }

@@ -166,7 +166,9 @@ impl Run<'_> {
             let why = match &goal.set_aside {
                 Some(aside) => format!("its deadline has passed; it was set aside: {aside}"),
                 None => match &goal.missed_deadline {
-                    Some(late) => format!("its deadline has passed; it would have been {late}"),
+                    Some(late) => {
+                        format!("its deadline has passed; it would have been reached {late}")
+                    }
                     None => "its deadline has passed".to_owned(),
                 },
             };
@@ -292,7 +294,7 @@ impl Run<'_> {
         self.reasons.clear();
         self.replans = 0;
         self.search_results = SearchResults::default();
-        self.record_goal_change("the others are reached".to_owned(), true);
+        self.record_goal_change("the other goals are reached".to_owned(), true);
         true
     }
 
@@ -301,7 +303,7 @@ impl Run<'_> {
     fn select_after_closing(&mut self) -> bool {
         let has_closed = std::mem::take(&mut self.search_results.has_closed_goals);
         if has_closed && !(self.is_selecting_goals() && self.restart_selection(false)) {
-            self.record_goal_change("some are reached".to_owned(), true);
+            self.record_goal_change("some goals are reached".to_owned(), true);
         }
         has_closed
     }
@@ -468,14 +470,16 @@ impl Run<'_> {
                 None if choosing.selection.is_excluded(position) => match goal.terms.deadline {
                     Some(_) => match &goal.missed_deadline {
                         Some(late) => {
-                            format!("no plan reaches it by its deadline; it would be {late}")
+                            format!(
+                                "no plan reaches it by its deadline; it would be reached {late}"
+                            )
                         }
                         None => "no plan reaches it by its deadline".to_owned(),
                     },
                     None => "no plan reaches it".to_owned(),
                 },
                 None if choosing.selection.is_untried(position) => {
-                    format!("a plan for {list} is found first")
+                    format!("a plan for {list} is sought first")
                 }
                 None => match conflicts
                     .iter()
@@ -496,7 +500,7 @@ impl Run<'_> {
         if is_last && !is_to_plan {
             self.set_goal();
         } else {
-            self.record_goal_change(format!("now pursued: {list}"), true);
+            self.record_goal_change(format!("pursued from now on: {list}"), true);
         }
         true
     }

@@ -28,7 +28,7 @@ pub enum Wait {
 }
 
 /// Reason for which a goal to keep is queued although it does not hold.
-const OTHERS: &str = "it does not hold; other goals are pursued first";
+const OTHERS: &str = "it does not hold, but other goals are pursued first";
 
 impl OpenGoal {
     /// Returns `true` if it is to be kept, and is released.
@@ -134,7 +134,7 @@ impl Run<'_> {
         lasting.goals.extend(opened);
         self.pursue_all();
         self.record_goal_change(
-            format!("{} to be kept does not hold", names.join(", ")),
+            format!("{} does not hold and is to be kept", names.join(", ")),
             false,
         );
     }

@@ -37,10 +37,10 @@ pub fn is_correction(remark: &str) -> bool {
 }
 
 /// Objection to a report on a ticket that was never issued.
-const UNKNOWN_TICKET: &str = "nothing of that number was started";
+const UNKNOWN_TICKET: &str = "no action with this ticket was started";
 
 /// Objection to a report on a start that is no longer known.
-const FORGOTTEN_TICKET: &str = "it had ended, and was long past";
+const FORGOTTEN_TICKET: &str = "the action has ended long ago";
 
 impl Run<'_> {
     /// Updates the belief with the reports, as far as they are credible, and records the news.
@@ -111,7 +111,7 @@ impl Run<'_> {
             Event::Fact { fact, truth } => {
                 self.advance_belief(&time);
                 if self.task.is_derived(*fact) {
-                    return Some("follows from other facts, and is not believed by itself");
+                    return Some("is derived from other facts; the report is ignored");
                 }
                 if self.belief.observe_fact(*fact, *truth) {
                     self.record_believed_event(&time, BelievedEventKind::Fact(*fact, *truth));
@@ -137,7 +137,7 @@ impl Run<'_> {
             Event::PlanReady => return self.note_plan_ready(),
             Event::Unintelligible { said, why } => {
                 self.clock_watchdog.record_unreadable_message(said, why);
-                return Some("cannot be understood; nothing was made of it");
+                return Some("cannot be parsed; it is ignored");
             }
         };
         remark.or(is_early.then_some(TIME_IN_FUTURE))
@@ -152,7 +152,7 @@ impl Run<'_> {
     ) -> Remark {
         match self.action_log.recent(ticket) {
             None => Some(self.unknown_ticket_remark(ticket)),
-            Some(entry) if entry.ended.is_some() => Some("it had ended already"),
+            Some(entry) if entry.ended.is_some() => Some("the action had already ended"),
             Some(_) => {
                 if let Some(done) = done {
                     self.action_log.note_progress(ticket, time, done);
@@ -187,10 +187,10 @@ impl Run<'_> {
             return Some(self.unknown_ticket_remark(ticket));
         };
         if entry.started.is_some() {
-            return Some("it had started already");
+            return Some("the action had already started");
         }
         if entry.ended.is_some() {
-            return Some("it had ended already");
+            return Some("the action had already ended");
         }
         let is_too_early = *time < entry.commanded;
         let time = time.clone().max(entry.commanded.clone());
@@ -240,11 +240,12 @@ impl Run<'_> {
             let are_both_without_end =
                 *earlier != Ending::Succeeded && *ending != Ending::Succeeded;
             if is_same || are_both_without_end {
-                return Some("it had ended already");
+                return Some("the action had already ended");
             }
             self.process_contradiction(ticket);
             return Some(
-                "it had ended otherwise; the facts and numbers it changes are unknown now",
+                "the reported end differs from an earlier one; the facts and numbers that the \
+                 action changes are now unknown",
             );
         }
         let is_refused = entry.started.is_none() && *ending != Ending::Succeeded;

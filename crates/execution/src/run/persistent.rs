@@ -166,21 +166,21 @@ impl<'a> Run<'a> {
     /// Processes a request.
     pub(super) fn process_request(&mut self, request: &Request) -> Remark {
         let Some(lasting) = &mut self.goal_manager else {
-            return Some("this run takes no requests; nothing was made of it");
+            return Some("this run accepts no requests; the request is ignored");
         };
         match request {
             Request::Pursue { .. } if lasting.idle_behaviour != IdleBehaviour::Wait => {
-                Some("this run takes no other goals; nothing was made of it")
+                Some("this run accepts no other goals; the goal is ignored")
             }
             Request::Pursue { terms, .. } if !terms.value.is_positive() => {
-                Some("the value of a goal is not positive; nothing was made of it")
+                Some("the value of a goal must be positive; the goal is ignored")
             }
             Request::Pursue { terms, .. } if terms.keep && terms.deadline.is_some() => {
-                Some("a goal to keep has no deadline; nothing was made of it")
+                Some("a goal to keep cannot have a deadline; the goal is ignored")
             }
             Request::Pursue { name, goal, terms } => {
                 let Ok(condition) = lasting.reader.read(&self.task, goal) else {
-                    return Some("it is no goal of this problem; nothing was made of it");
+                    return Some("it is not a valid goal of this problem; it is ignored");
                 };
                 let text = Some(goal.clone());
                 let mut given = OpenGoal::new(&self.task, name.clone(), text, condition);
@@ -189,8 +189,8 @@ impl<'a> Run<'a> {
             }
             Request::Abandon { name } => self.abandon_goal(name),
             Request::CancelAction { ticket } => self.cancel_on_request(*ticket),
-            Request::Pause if lasting.is_paused => Some("it is paused already"),
-            Request::Resume if !lasting.is_paused => Some("it is not paused"),
+            Request::Pause if lasting.is_paused => Some("the run is already paused"),
+            Request::Resume if !lasting.is_paused => Some("the run is not paused"),
             Request::Pause | Request::Resume => {
                 lasting.is_paused = *request == Request::Pause;
                 None
@@ -200,7 +200,7 @@ impl<'a> Run<'a> {
 
     fn cancel_on_request(&mut self, ticket: ActionHandle) -> Remark {
         if !self.action_log.open_tickets().any(|open| open == ticket) {
-            return Some("no action with that ticket is running");
+            return Some("no running action has this ticket");
         }
         self.cancel(vec![ticket]);
         None

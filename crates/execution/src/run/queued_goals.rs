@@ -56,7 +56,7 @@ impl Run<'_> {
             return None;
         }
         if lasting.goals.extract_if(.., is_it).count() == 0 {
-            return Some("no goal of that name is open");
+            return Some("there is no open goal with this name");
         }
         self.pursue_all();
         self.record_goal_change(format!("`{name}` is abandoned"), false);

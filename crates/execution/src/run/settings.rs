@@ -203,7 +203,8 @@ impl MissingPlan {
             Self::NotSearched => None,
             Self::NotFound => Some("another planner may find one (--planner)"),
             Self::InDoubt => Some(
-                "reports of the world on these facts and numbers, or on the action's end, settle the doubt",
+                "the doubt ends when the world reports these facts and numbers, or the action's \
+                 end",
             ),
             Self::Rejected => Some("try another executor (--executor)"),
         }

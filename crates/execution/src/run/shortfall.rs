@@ -103,7 +103,7 @@ impl Run<'_> {
         let goals = self.goal_manager.iter().flat_map(|it| &it.goals);
         let late = goals.filter(|goal| goal.is_pursued()).filter_map(|goal| {
             let late = goal.missed_deadline.as_ref()?;
-            let words = format!("`{}` would be {late}", goal.name);
+            let words = format!("`{}` would be reached {late}", goal.name);
             Some(Reason::new(Cause::TooLate).about(Subject::ExternalMessage(words)))
         });
         late.collect()

@@ -46,7 +46,7 @@ pub enum Next {
 /// Error: the answer was not requested. [`Run::observe`] answers [`Next::Wait`], and [`Run::observe_requested`]
 /// answers [`Next::Look`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the run has not asked for {what}; call `Run::next` first")]
+#[error("the run has not requested {what}; call `Run::next` first")]
 pub struct UnexpectedAnswer {
     what: &'static str,
 }

@@ -212,9 +212,9 @@ impl FromStr for TimeoutRule {
     fn from_str(text: &str) -> Result<Self, UnknownSetting> {
         Self::read(text).ok_or_else(|| UnknownSetting {
             text: text.to_owned(),
-            expected: "a time-out: `none`, a positive number of seconds, or `10x,600` for 10 \
-                       times the planned duration, but at least 600 seconds; actions of their own \
-                       behind it: `10x,600; drive=40; (pick a)=3x,5`",
+            expected: "a time-out: `none`, a positive number of seconds, or `10x,600` for 10 times \
+                       the planned duration, but at least 600 seconds; time-outs of single actions \
+                       follow: `10x,600; drive=40; (pick a)=3x,5`",
         })
     }
 }

@@ -108,7 +108,7 @@ impl InitialProblem {
                 SlotState::Free => {}
                 SlotState::Given(_) | SlotState::Busy => {
                     let error = "another problem has just been given";
-                    let help = "ask again in a moment; `elbowroom ctl state` says how things stand";
+                    let help = "repeat the request later; `elbowroom ctl state` shows the state";
                     return Err(ApiError::new(409, error, help));
                 }
                 SlotState::Closed => return Err(ended()),
@@ -126,7 +126,7 @@ impl InitialProblem {
 }
 
 fn ended() -> ApiError {
-    ApiError::new(409, "the executive has ended", "start another one")
+    ApiError::new(409, "the executive has ended", "start another executive")
 }
 
 #[cfg(test)]

@@ -25,7 +25,7 @@ impl ApiRouter {
     pub(super) fn obstacle_to_readiness(&self) -> Option<String> {
         let state = self.state();
         match (state.activity, state.unanswered) {
-            (Activity::Beginning, _) => Some(state.why.unwrap_or("it begins".to_owned())),
+            (Activity::Beginning, _) => Some(state.why.unwrap_or("it is starting".to_owned())),
             (Activity::Over, _) => Some("the run has ended".to_owned()),
             (_, Some(seconds)) => Some(format!("the world has not answered for {seconds} s")),
             _ => None,

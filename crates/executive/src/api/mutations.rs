@@ -88,12 +88,12 @@ impl ApiRouter {
             return Err(ApiError::new(
                 409,
                 "the executive has ended",
-                "start another one",
+                "start another executive",
             ));
         }
         let full = || {
-            let help = "wait until it has processed some; `elbowroom ctl state` shows its state";
-            ApiError::new(503, "too many requests wait for the executive", help)
+            let help = "repeat the request later; `elbowroom ctl state` shows its state";
+            ApiError::new(503, "too many requests are pending", help)
         };
         let number = self.queue().submit(requests).ok_or_else(full)?;
         let until = match self.queue().wait_until_accepted(number, ACCEPT_TIMEOUT) {
@@ -101,8 +101,8 @@ impl ApiRouter {
             RequestStatus::Pending => Some(self.obstacle()),
             RequestStatus::JournalFailed => return Err(journal_failed()),
             RequestStatus::RunEnded => {
-                let error = "the executive has ended before it took this in";
-                return Err(ApiError::new(409, error, "start another one"));
+                let error = "the executive has ended before it accepted the request";
+                return Err(ApiError::new(409, error, "start another executive"));
             }
         };
         Ok(Taken {
@@ -155,8 +155,8 @@ impl ApiRouter {
             "failed" => outcome(false),
             "cancelled" => ExternalRequest::Request(Request::CancelAction { ticket }),
             other => {
-                let error = format!("`{}` is no outcome of an action", other.escape_debug());
-                let help = "say `done`, `failed` or `cancelled`";
+                let error = format!("`{}` is not an outcome of an action", other.escape_debug());
+                let help = "write `done`, `failed` or `cancelled`";
                 return Err(ApiError::new(422, error, help));
             }
         };
@@ -177,7 +177,7 @@ impl ApiRouter {
     /// objects.
     fn problem(&self, given: NewProblem) -> Result<Taken, ApiError> {
         let fixed = || {
-            let error = "this run has a problem of its own";
+            let error = "this run has a fixed problem";
             ApiError::new(409, error, "`elbowroom serve` accepts problems")
         };
         let domain = self.domain().ok_or_else(fixed)?.source();
@@ -201,7 +201,7 @@ impl ApiRouter {
 
 /// Returns the error for requests while the journal cannot be written.
 fn journal_failed() -> ApiError {
-    let error = "the journal cannot be written, so this is not kept, and the executive ends";
+    let error = "the journal cannot be written; the request is lost, and the executive ends";
     let help =
         "free some disk space, continue with `elbowroom serve --resume`, and repeat the request";
     ApiError::new(503, error, help)
@@ -212,22 +212,22 @@ fn check_further(problem: &Problem, task: &Task, state: &State) -> Result<(), Ap
     if problem.objects != task.problem().objects {
         return Err(ApiError::new(
             409,
-            "this problem has other objects than the one that is executed",
+            "this problem has other objects than the current one",
             "stop the executive, and start one for this problem",
         ));
     }
     if !problem.timed.is_empty() {
         return Err(ApiError::new(
             409,
-            "a problem with timed initials can only be the first one",
+            "only the first problem may have timed initials",
             "leave them out, or start another executive",
         ));
     }
     if !state.running.is_empty() {
         return Err(ApiError::new(
             409,
-            "actions are running, and their effects are no part of this problem",
-            "pause, wait until they have ended, and give it again; or give goals and facts",
+            "actions are running, and this problem does not contain their effects",
+            "pause, wait until they have ended, and repeat the request; or send goals and facts",
         ));
     }
     Ok(())
@@ -282,15 +282,11 @@ fn timed_facts(task: &Task) -> impl Iterator<Item = FactId> {
 
 /// Parses a body.
 fn read<T: DeserializeOwned>(body: &[u8]) -> Result<T, ApiError> {
-    let help = "GET /v1/openapi.json says what belongs into it";
+    let help = "GET /v1/openapi.json documents the members";
     if body.trim_ascii_start().starts_with(b"[") {
         // Serde would accept a list of the members.
-        return Err(ApiError::new(
-            422,
-            "the body is a list, not an object",
-            help,
-        ));
+        return Err(ApiError::new(422, "expected an object, found a list", help));
     }
     serde_json::from_slice(body)
-        .map_err(|error| ApiError::new(422, format!("the body cannot be read: {error}"), help))
+        .map_err(|error| ApiError::new(422, format!("cannot parse the body: {error}"), help))
 }

@@ -171,7 +171,7 @@ impl ApiRouter {
     /// When there is no problem yet.
     pub(super) fn run(&self) -> Result<&ServedRun, ApiError> {
         let waiting = "the executive has no problem yet";
-        let help = "give it one: `elbowroom ctl problem FILE`, or PUT /v1/problem";
+        let help = "send one: `elbowroom ctl problem FILE`, or PUT /v1/problem";
         self.run
             .get()
             .ok_or_else(|| ApiError::new(409, waiting, help))
@@ -205,14 +205,17 @@ impl ApiRouter {
         let request = match request {
             Ok(request) => request,
             Err(RequestError { status, reason }) => {
-                let help = "docs/serve.md says what an executive understands";
+                let help = "docs/serve.md documents the requests";
                 return refuse(stream, &ApiError::new(status, reason, help));
             }
         };
         let is_own = |host: &str| is_local_name(host);
         if is_local_only && !request.header("host").is_some_and(is_own) {
-            let error = format!("this is not the page of that host; {} is", self.own);
-            return refuse(stream, &ApiError::new(403, error, "use the address itself"));
+            let error = format!(
+                "this host name is not accepted; the page is at {}",
+                self.own
+            );
+            return refuse(stream, &ApiError::new(403, error, "use that address"));
         }
         let _counted = (request.method != "GET").then(|| Changing::begin(self));
         match self.respond(&request, stream) {
@@ -251,10 +254,9 @@ impl ApiRouter {
                 if let (Some(after), Some(until)) = (after, self.buffer.last_omitted_line())
                     && after < until
                 {
-                    let error = format!("the lines up to {until} are no longer kept here");
+                    let error = format!("the lines up to {until} are no longer in memory");
                     let help = format!(
-                        "/v1/events?after={until} has the others; the files of --journal and --trace \
-                         have all of them"
+                        "/v1/events?after={until} returns the later ones; the files of --journal and --trace have all"
                     );
                     return Err(ApiError::new(410, error, help));
                 }
@@ -271,8 +273,8 @@ impl ApiRouter {
                 self.allow(request)?;
                 self.change("POST", &format!("/v1{path}"), b"")?;
                 let words = match path {
-                    "/pause" => "Nothing more is started; running actions continue.\n",
-                    _ => "It goes on.\n",
+                    "/pause" => "No further actions are started; running actions continue.\n",
+                    _ => "The executive continues.\n",
                 };
                 respond(stream, 202, TEXT, words)
             }
@@ -341,8 +343,8 @@ impl ApiRouter {
             (Some(_), given) => Err(ApiError::new(
                 401,
                 match given {
-                    Some(_) => "this is not the token",
-                    None => "this takes the executive's token",
+                    Some(_) => "wrong token",
+                    None => "this request needs the executive's token",
                 },
                 "`elbowroom ctl --token FILE`, or the header `Authorization: Bearer TOKEN`",
             )),
@@ -367,7 +369,7 @@ impl ServedRun {
             Accepted::PausesOnly => {
                 "this run has one goal, and accepts no other goals, problems, facts or numbers"
             }
-            _ => "this run accepts no request but to stop",
+            _ => "this run accepts only requests to stop",
         };
         let help = "`elbowroom serve` accepts goals, problems, facts, numbers and pauses";
         Err(ApiError::new(409, error, help))
@@ -399,7 +401,7 @@ fn first_line(request: &Request) -> Result<Option<usize>, ApiError> {
     let number = number.map(str::parse::<usize>).transpose();
     number.map_err(|_| {
         let help = "for example /v1/events?after=0 for all lines";
-        ApiError::new(422, "`after` is no number of a line", help)
+        ApiError::new(422, "expected a line number in `after`", help)
     })
 }
 
@@ -434,10 +436,10 @@ fn unknown_path_error(path: &str, method_name: &str) -> ApiError {
     let help = "GET /v1/openapi.json lists all requests";
     match methods(path).next() {
         Some(verb) => {
-            let error = format!("{path} is not for {method_name}, but for {verb}");
+            let error = format!("{path} does not support {method_name}, but {verb}");
             ApiError::new(405, error, help)
         }
-        None => ApiError::new(404, "there is nothing at this path", help),
+        None => ApiError::new(404, "unknown path", help),
     }
 }
 

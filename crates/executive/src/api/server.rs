@@ -60,7 +60,7 @@ fn socket(path: &Path) -> Result<Listener, Error> {
     let cannot = |why: &dyn fmt::Display| {
         Error::new(
             format!("cannot listen at {}: {why}", path.display()),
-            "choose a path at which there is nothing, in a folder that exists and that you may write to",
+            "choose a path that does not exist yet, in an existing folder with write permission",
         )
     };
     let is_socket = std::fs::symlink_metadata(path)
@@ -82,7 +82,7 @@ fn socket(path: &Path) -> Result<Listener, Error> {
 fn socket(path: &Path) -> Result<Listener, Error> {
     Err(Error::new(
         format!(
-            "cannot listen at {}: this system has no such sockets",
+            "cannot listen at {}: this system has no Unix sockets",
             path.display()
         ),
         "leave out --socket; --http serves the same",

@@ -39,7 +39,7 @@ impl AccessControl {
                     io_error_message(&error)
                 ),
                 format!(
-                    "the option names a file with a token in it; {}",
+                    "the option expects a file that contains a token; {}",
                     token_file_advice(path)
                 ),
             )
@@ -145,7 +145,7 @@ impl Address {
         let found = found.ok().filter(|_| !is_number);
         let found = found.and_then(|mut all| all.next());
         found.map(Self).ok_or_else(|| {
-            "it is no address; write a port such as 8080, or host and port such as 0.0.0.0:8080"
+            "expected an address: a port such as 8080, or host and port such as 0.0.0.0:8080"
                 .to_owned()
         })
     }

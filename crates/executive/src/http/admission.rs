@@ -111,7 +111,7 @@ impl Admission {
             Class::Known if clients.known >= MAX_SERVED => {
                 return Err(RequestError::new(
                     503,
-                    "too many clients with the token; come back later",
+                    "too many clients with the token; try again later",
                 ));
             }
             Class::Known => clients.known += 1,
@@ -123,7 +123,7 @@ impl Admission {
                 if is_too_many {
                     return Err(RequestError::new(
                         503,
-                        "too many clients without the token; come back later",
+                        "too many clients without the token; try again later",
                     ));
                 }
                 clients.others += 1;

@@ -61,7 +61,7 @@ impl Target {
             #[cfg(unix)]
             Self::Socket(path) => UnixStream::connect(path).map(Stream::Unix),
             #[cfg(not(unix))]
-            Self::Socket(_) => Err(io::Error::other("this system has no such sockets")),
+            Self::Socket(_) => Err(io::Error::other("this system has no Unix sockets")),
         }
     }
 }
@@ -134,7 +134,7 @@ pub fn send(
 
 /// Reads the status line and the headers of a response. Returns the status code.
 fn read_head(response: &mut impl BufRead) -> io::Result<u16> {
-    let nonsense = || io::Error::other("what answers there is not HTTP");
+    let nonsense = || io::Error::other("the answer is not HTTP");
     let mut limited = response.take(MAX_HEAD);
     let mut head = Vec::new();
     while limited.read_until(b'\n', &mut head)? > 0 {

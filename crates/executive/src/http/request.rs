@@ -55,7 +55,7 @@ impl Request {
         if self.header("transfer-encoding").is_some() {
             return Err(RequestError::new(
                 411,
-                "a body needs a Content-Length; it cannot come in chunks",
+                "a body needs a Content-Length; chunked bodies are not supported",
             ));
         }
         let Some(length) = self.header("content-length") else {
@@ -63,7 +63,7 @@ impl Request {
         };
         // `parse` alone would accept a sign.
         if length.is_empty() || !length.bytes().all(|byte| byte.is_ascii_digit()) {
-            return Err(RequestError::new(400, "the Content-Length is no number"));
+            return Err(RequestError::new(400, "the Content-Length is not a number"));
         }
         let length = length.parse().ok();
         length
@@ -122,7 +122,7 @@ fn read_more(stream: &mut Stream, text: &mut Vec<u8>, clock: &Clock) -> Result<(
     let mut bytes = [0; 8192];
     let count = stream.read(&mut bytes).map_err(|_| late)?;
     if count == 0 {
-        return Err(RequestError::new(400, "the request ends in the middle"));
+        return Err(RequestError::new(400, "the request is incomplete"));
     }
     text.extend_from_slice(&bytes[..count]);
     Ok(())
@@ -163,7 +163,7 @@ fn parse_head(text: &[u8]) -> Result<Option<(Request, usize)>, RequestError> {
         if earlier.is_some() && is_single {
             return Err(RequestError::new(
                 400,
-                "a header that may be there once is there twice",
+                "a header that may occur only once occurs twice",
             ));
         }
     }

@@ -74,7 +74,7 @@ impl Clocks {
     pub(super) fn time(&self, name: &str, stamp: &Rational) -> Result<Rational, String> {
         let clock = self.0.get(name).ok_or_else(|| {
             format!(
-                "nothing is known of the clock `{name}`; say first what it shows: \
+                "unknown clock `{name}`; send a reading of it first: \
                  {{\"type\":\"clock\",\"clock\":\"{name}\",\"reads\":…,\"time\":…}}"
             )
         })?;
@@ -104,7 +104,7 @@ fn is_credible(rate: &Rational) -> bool {
 
 fn implausible(name: &str, rate: &Rational) -> String {
     format!(
-        "the clock `{name}` cannot run {} times as fast as time passes; `rate` is close to 1",
+        "the clock `{name}` cannot run at {} times the speed of the world's clock; `rate` must be close to 1",
         rate.to_f64()
     )
 }

@@ -147,8 +147,8 @@ impl MessageParser {
             Some("time") => return self.time(&message).map(Message::Time),
             Some(word @ ("clock" | "feedback")) if self.greeting.is_none() => {
                 return Err(format!(
-                    "`{word}` belongs to version 2 of the protocol; greet first, with \
-                     {{\"type\":\"hello\",\"version\":2,\"can\":[…]}}"
+                    "`{word}` needs version 2 of the protocol; send {{\"type\":\"hello\",\"version\":2,\"can\":[…]}} \
+                     first"
                 ));
             }
             Some("unknown") if self.greeting.is_some() => return Ok(Message::Unknown),
@@ -169,7 +169,7 @@ impl MessageParser {
             | Event::Feedback { ticket, .. }
                 if ticket.0 >= self.next_ticket =>
             {
-                Err(format!("ticket {} was never given", ticket.0))
+                Err(format!("unknown ticket {}", ticket.0))
             }
             _ => Ok(Message::Observation(observation)),
         }
@@ -177,12 +177,12 @@ impl MessageParser {
 
     fn greeted(&mut self, message: &Value) -> Result<(), String> {
         if self.greeting.is_some() || self.has_spoken {
-            return Err("`hello` comes once, and before anything else".to_owned());
+            return Err("`hello` must be the first message, and may occur only once".to_owned());
         }
         let version = message.get("version").and_then(Value::as_u64);
         let version = version.filter(|version| VERSIONS.contains(version));
         let Some(version) = version else {
-            return Err("`version` must be 1 or 2: no others are spoken here".to_owned());
+            return Err("`version` must be 1 or 2".to_owned());
         };
         let can = match message.get("can") {
             None => Some(Vec::new()),
@@ -210,7 +210,7 @@ impl MessageParser {
             && question.as_u64() != Some(self.question)
         {
             return Err(format!(
-                "it answers question {question}, but number {} is open",
+                "it answers question {question}, but question {} is pending",
                 self.question
             ));
         }

@@ -15,8 +15,9 @@ use elbowroom_sim::{Purpose, WorldModel};
 use elbowroom::execute::rewrite::{add_function_of, set_durations};
 
 /// Summary of the row, in one sentence.
-pub(super) const SUMMARY: &str = "The share of trials in which the planner, with the executors' \
-    limits, finds a plan when everything is known in advance, or one of the executors gets there.";
+pub(super) const SUMMARY: &str = "Share of trials in which the planner, with the executors' \
+                                  limits, finds a plan if everything is known in advance, or in \
+                                  which one of the executors reaches the goal.";
 
 /// Returns `true` if a plan reaches the goal when the world of that seed is known in advance.
 pub(super) fn can_reach(

@@ -12,8 +12,9 @@ use crate::timed::{Settings, optimum};
 pub(super) const ROW: &str = "optimum without foresight";
 
 /// Summary of the row, in one sentence.
-pub(super) const SUMMARY: &str = "Bounds, in percent, for what the best of all executors reaches that knows \
-    the world's distributions but not what will happen; it replans at any time and in no time.";
+pub(super) const SUMMARY: &str = "Bounds, in percent, for the best executor that knows the world's \
+                                  distributions but not the outcomes, and replans at any time \
+                                  without delay.";
 
 /// Optimum of a column: the mean over its problems, or over those of a part of an experiment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

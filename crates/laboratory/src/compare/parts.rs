@@ -22,7 +22,7 @@ pub(crate) trait Partial: Clone {
 /// They belong to different experiments, or a part occurs twice. The text is for the user.
 pub(crate) fn merge_parts<P: Partial>(parts: &[P]) -> Result<P, String> {
     let Some((first, rest)) = parts.split_first() else {
-        return Err("there is nothing to put together".to_owned());
+        return Err("there are no results to merge".to_owned());
     };
     let mut whole = first.clone();
     for part in rest {
@@ -33,7 +33,7 @@ pub(crate) fn merge_parts<P: Partial>(parts: &[P]) -> Result<P, String> {
         let mut part = part.clone();
         let (theirs, mine) = (part.parts().1, whole.parts().1);
         if let Some(twice) = theirs.iter().find(|shard| mine.contains(shard)) {
-            return Err(format!("part {twice} is there twice"));
+            return Err(format!("part {twice} is given twice"));
         }
         mine.append(theirs);
     }

@@ -167,7 +167,7 @@ impl Results {
             return Err(ResultsError("rows and columns do not fit".to_owned()));
         }
         if !parts::are_valid_parts(results.shards, &results.parts) {
-            return Err(ResultsError("there are no such parts".to_owned()));
+            return Err(ResultsError("these parts do not exist".to_owned()));
         }
         Ok(results)
     }
@@ -234,8 +234,8 @@ impl Results {
                 runs.sum::<u64>()
             });
             made = format!(
-                "interrupted after {made_here} trials of {made}; problems are taken one after the \
-                 other, and those that are missing may be harder or easier"
+                "interrupted after {made_here} trials of {made}; the problems are processed in \
+                 order, and the missing ones may be harder or easier"
             );
         }
         Table {
@@ -322,9 +322,7 @@ impl Results {
         ));
         for (name, column) in self.columns.iter().zip(&self.optimum) {
             let reason = column.unknown.as_ref();
-            notes.extend(
-                reason.map(|why| format!("`{}` in {name} is not known: {why}", optimum::ROW)),
-            );
+            notes.extend(reason.map(|why| format!("unknown `{}` in {name}: {why}", optimum::ROW)));
         }
         notes
     }

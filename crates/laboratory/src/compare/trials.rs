@@ -131,7 +131,7 @@ impl Setting<'_> {
         if verdict.is_valid() {
             Ok(plan)
         } else {
-            Err(self.error("`plan` is not valid for it; `elbowroom check` says why"))
+            Err(self.error("`plan` is not valid for it; `elbowroom check` explains why"))
         }
     }
 
@@ -201,7 +201,10 @@ impl Setting<'_> {
     pub(super) fn trace(&self, trial: u64) -> Result<String, ExperimentError> {
         let (row, column) = (0, 0);
         if self.experiment.columns[column].believed.is_some() {
-            return Err(self.error("a trace names one world only, and the executors of the first column believe in another"));
+            return Err(self.error(
+                "a trace contains only one world, but the executors of the first \
+                                   column believe in another",
+            ));
         }
         let mut common = self.common(&|| true)?;
         let seed = self.seed(trial);

@@ -164,7 +164,7 @@ impl PerturbationNames {
             };
             (0..count).map(PredicateId).find(is_it).ok_or_else(|| {
                 PerturbedError::other(format!(
-                    "[perturbation] names `{name}`, and the domain has no such predicate"
+                    "[perturbation] names `{name}`, which is not a predicate of the domain"
                 ))
             })
         };
@@ -322,7 +322,8 @@ impl PerturbedExperiment {
         if read.trials == 0 || read.worlds.is_empty() || read.executors.is_empty() {
             return Err(wrong(
                 read.format.span(),
-                "there is nothing to make; write at least one of `trials`, `worlds` and `executors`",
+                "the experiment is empty; expected at least one of `trials`, `worlds` and \
+                 `executors`",
             ));
         }
         if read.worlds.contains(&WorldKind::AsPublished) && read.perturbation.is_none() {
@@ -343,7 +344,7 @@ impl PerturbedExperiment {
         if cases.is_empty() {
             return Err(wrong(
                 read.format.span(),
-                "there are no cases; write [[case]], or `include` files that have some",
+                "there are no cases; write [[case]], or `include` files with cases",
             ));
         }
         Ok(Self {
@@ -379,7 +380,7 @@ fn parsed(source: &Source) -> Result<File, PerturbedError> {
         elbowroom_text::toml::read(source).map_err(|found| PerturbedError::Text(found.into()))?;
     if *read.version.get_ref() != 1 {
         let version = read.version.get_ref();
-        let message = format!("version {version} is not known; this program reads version 1");
+        let message = format!("unknown version {version}; this program reads version 1");
         return Err(PerturbedError::at(source, read.version.span(), message));
     }
     Ok(read)
@@ -405,7 +406,7 @@ fn own_cases(
         None => Err(PerturbedError::at(
             source,
             read.format.span(),
-            format!("there are cases, but no `{what}` that they are about"),
+            format!("there are cases, but `{what}` is missing"),
         )),
     };
     if read.case.is_empty() {

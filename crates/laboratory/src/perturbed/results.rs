@@ -64,7 +64,7 @@ impl PerturbedResults {
             )));
         }
         if !parts::are_valid_parts(results.shards, &results.parts) {
-            return Err(PerturbedError::other("there are no such parts"));
+            return Err(PerturbedError::other("these parts do not exist"));
         }
         Ok(results)
     }

@@ -104,7 +104,7 @@ impl StoredTrial {
     /// The text does not hold the course of a trial.
     pub fn read(text: &str) -> Result<Self, PerturbedError> {
         let course: Self = serde_json::from_str(text)
-            .map_err(|error| PerturbedError::other(format!("no course of a trial: {error}")))?;
+            .map_err(|error| PerturbedError::other(format!("not a stored trial: {error}")))?;
         if course.format == FORMAT && course.version == 1 {
             Ok(course)
         } else {

@@ -130,7 +130,7 @@ fn describe_agreement(rows: &[Row]) -> Option<String> {
     let squares: f64 = rows.iter().filter_map(Row::distance).map(|z| z * z).sum();
     (compared > 0).then(|| {
         format!(
-            "Of {compared} published success rates, {} have ours in their 95 % interval; {} do \
+            "The 95 % intervals of {} of {compared} published success rates contain ours; {} do \
              not differ from ours at the 5 % level. The squared distances z add up to \
              {squares:.0}; {compared} are expected.",
             inside.count(),

@@ -65,9 +65,9 @@ pub const EXECUTORS: &[ExecutorEntry] = &[
     },
     ExecutorEntry {
         name: "as-published",
-        summary: "The authors' program: the last order found instead of the best, and no \
-                  second search. When its order no longer fits, it does nothing more (the \
-                  authors' program did a little, without effect).",
+        summary: "The authors' program: the last order found instead of the best, and no second \
+                  search. When its order no longer fits, it stops (the authors' program executed a \
+                  few more actions, without effect).",
         paper: "the program behind the results of Ribeiro et al. (2021)",
         construct: |means| {
             let (task, likelihoods) = means.task_and_likelihoods();
@@ -126,7 +126,7 @@ impl ExecutorName {
 /// There is no executor of that name without a clock.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "there is no executor `{name}`{clock}; choose one of {known}",
+    "unknown executor `{name}`{clock}; choose one of {known}",
     clock = if *.needs_clock { " without a clock" } else { "" },
     known = EXECUTORS.iter().map(|known| known.name).collect::<Vec<_>>().join(", ")
 )]
@@ -184,7 +184,7 @@ mod tests {
     fn timed_only_and_unknown_executors_are_distinguished() {
         let wrong = |name: &str| name.parse::<ExecutorName>().unwrap_err().to_string();
         assert!(wrong("guarded").contains("`guarded` without a clock"));
-        assert!(wrong("gaurded").starts_with("there is no executor `gaurded`; choose one of"));
+        assert!(wrong("gaurded").starts_with("unknown executor `gaurded`; choose one of"));
         assert!(wrong("guarded").ends_with("esterel, adaptable, as-published, lookahead"));
     }
 

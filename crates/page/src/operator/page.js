@@ -30,7 +30,7 @@ function showWarnings(state, view, now) {
 
 function showDecision(state, now) {
   const next = state.next ?? {};
-  let text = next.decision ?? "nothing was decided";
+  let text = next.decision ?? "no decision yet";
   if (next.until !== undefined) text += ` until ${nearest(next.until)}`;
   setText(byId("decision"), next.why ? `${text}: ${next.why}` : text);
   setText(byId("decided"), next.decided === undefined ? "" : `decided at ${nearest(next.decided)}, ${distance(next.decided, now)}`);

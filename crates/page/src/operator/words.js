@@ -61,7 +61,7 @@ function warnings(state, now) {
   const found = [];
   if (state.restarting !== undefined) found.push({ key: "restarting", kind: "world restarting", words: `world restarting: ${state.restarting}` });
   if (state.unanswered !== undefined) {
-    found.push({ key: "unanswered", kind: "the world does not answer", words: `the world has not answered for ${state.unanswered} s: nothing is started, and no request taken in, until it does` });
+    found.push({ key: "unanswered", kind: "the world does not answer", words: `the world has not answered for ${state.unanswered} s: until it does, no action is started and no request is processed` });
   }
   for (const it of members(state.running)) {
     if (it.times_out !== undefined) found.push({ key: `out ${it.ticket}`, kind: `${it.action} times out`, words: `${it.action}: without progress, it times out at ${nearest(it.times_out)}`, until: it.times_out });

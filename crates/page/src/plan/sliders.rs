@@ -55,8 +55,8 @@ pub(crate) fn sliders(
     });
     Some(Sliders {
         heading: "What if?".to_owned(),
-        note: "Move a slider: the page works out exactly whether the plan still works when each quantity \
-               takes the value chosen here, and draws the plan at these values above."
+        note: "Move a slider: the page computes exactly whether the plan works with the chosen \
+               values of all quantities, and draws the plan with these values above."
             .to_owned(),
         sliders: reaches.iter().map(slider).collect(),
         bars: bars.collect::<Option<_>>()?,

@@ -58,8 +58,8 @@ pub(super) fn slack_table(rooms: &[LimitedRange], texts: &mut Texts) -> Table {
             ("lower", true),
             ("upper", true),
             ("time-out", true),
-            ("what limits the lower end", false),
-            ("what limits the upper end", false),
+            ("limit of the lower end", false),
+            ("limit of the upper end", false),
         ]),
         rows,
         ..Table::default()
@@ -150,8 +150,8 @@ pub(crate) fn times(timeline: &Timeline, values: &str) -> Table {
         heading: "Actions".to_owned(),
         note: if has_windows {
             format!(
-                "Start and end as planned, everything as early as possible; and the times possible \
-                 for all values {values}."
+                "Planned start and end, each as early as possible, and the possible times for all \
+                 values {values}."
             )
         } else {
             String::new()

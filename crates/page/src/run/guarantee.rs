@@ -60,7 +60,7 @@ impl Guarantees {
                         self.change(at, level, promise, words, &decided.reason.words);
                     }
                     (_, None) => {
-                        self.change(at, -1, "none", "none: this executor gives none", "");
+                        self.change(at, -1, "none", "none: this executor gives no guarantee", "");
                     }
                 }
             }
@@ -110,11 +110,11 @@ fn level_and_meaning(promise: &str) -> (i8, &'static str) {
     match promise {
         "envelope" => (
             3,
-            "works whatever happens within the envelope, unless an action times out",
+            "works for all values inside the envelope, unless an action times out",
         ),
         "part-of-envelope" => (
             2,
-            "works whatever happens within a part of the envelope, unless an action times out",
+            "works for all values inside a part of the envelope, unless an action times out",
         ),
         "planned" => (
             1,

@@ -66,7 +66,7 @@ impl Log {
             }
             Line::Planning(planning) => {
                 let why = planning.reason.words.clone();
-                let what = "a new plan is asked for".to_owned();
+                let what = "a new plan is requested".to_owned();
                 self.add(&planning.now.0, "planning", what, String::new(), why);
             }
             Line::Planned(planned) => {
@@ -77,7 +77,7 @@ impl Log {
                         steps.len(),
                         nearest(&planned.took.0)
                     ),
-                    (None, true) => "there is no plan any more".to_owned(),
+                    (None, true) => "there is no further plan".to_owned(),
                     (None, false) => "no plan was found".to_owned(),
                 };
                 let why = planned.why_not.clone().unwrap_or_default();
@@ -107,7 +107,7 @@ impl Log {
                 self.add(&rest.now.0, "rest", what, String::new(), why);
             }
             Line::Interrupted(line) => {
-                let what = "an operator asked the run to end".to_owned();
+                let what = "an operator requested the end of the run".to_owned();
                 self.add(&line.now.0, "end", what, String::new(), String::new());
             }
             Line::WorldFailed(line) => {
@@ -181,7 +181,7 @@ impl Log {
             ]
         });
         Table {
-            heading: "What happened, and why".to_owned(),
+            heading: "Events and reasons".to_owned(),
             columns: columns
                 .map(|(name, is_number)| (name.to_owned(), is_number))
                 .to_vec(),
@@ -203,7 +203,7 @@ fn decision(decision: &DecisionLine, bars: &Bars) -> String {
             format!("start {}", names.join(", "))
         }
         DecisionLine::Wait { until: Some(until) } => {
-            format!("wait until {} at most", nearest(&until.0))
+            format!("wait until {} at the latest", nearest(&until.0))
         }
         DecisionLine::Wait { until: None } => "wait".to_owned(),
         DecisionLine::Cancel { steps } => match bars.step_names(steps) {
@@ -246,7 +246,7 @@ fn observation<'a>(observation: &'a ObservationLine, bars: &Bars) -> (&'a Ration
                 let percent = &part.0 * &Rational::from(100);
                 format!(" is {} % done", nearest(&percent))
             });
-            let part = part.unwrap_or_else(|| " is under way".to_owned());
+            let part = part.unwrap_or_else(|| " is running".to_owned());
             let note = if note.is_empty() {
                 String::new()
             } else {
@@ -275,19 +275,19 @@ fn observation<'a>(observation: &'a ObservationLine, bars: &Bars) -> (&'a Ration
             let by = by.as_ref().map_or(String::new(), |by| format!(" by {by}"));
             let release = release.as_ref();
             let release = release.map_or(String::new(), |it| format!(", from {}", nearest(&it.0)));
-            (&time.0, format!("asked for{by}: {name}: {goal}{release}"))
+            (&time.0, format!("requested{by}: {name}: {goal}{release}"))
         }
-        ObservationLine::Abandon { name, time } => (&time.0, format!("asked to abandon: {name}")),
+        ObservationLine::Abandon { name, time } => (&time.0, format!("request to abandon: {name}")),
         ObservationLine::CancelAction { ticket, time } => (
             &time.0,
-            format!("asked to cancel the action of ticket {ticket}"),
+            format!("request to cancel the action of ticket {ticket}"),
         ),
-        ObservationLine::Pause { time } => (&time.0, "asked to pause".to_owned()),
-        ObservationLine::Resume { time } => (&time.0, "asked to continue".to_owned()),
-        ObservationLine::PlanMade { time } => (&time.0, "the plan is there".to_owned()),
+        ObservationLine::Pause { time } => (&time.0, "request to pause".to_owned()),
+        ObservationLine::Resume { time } => (&time.0, "request to continue".to_owned()),
+        ObservationLine::PlanMade { time } => (&time.0, "the plan is made".to_owned()),
         ObservationLine::PlanReady { time } => (&time.0, "the plan is ready".to_owned()),
         ObservationLine::Unintelligible { said, why, time } => {
-            (&time.0, format!("cannot be understood ({why}): {said}"))
+            (&time.0, format!("cannot be parsed ({why}): {said}"))
         }
     }
 }

@@ -6,7 +6,7 @@ function chartView(chart, textOf, onPick, life) {
   const sizer = element("div", {}, svg);
   const scroll = element("div", {
     class: "scroll", tabindex: "0", role: "application", "aria-roledescription": "chart",
-    "aria-label": `${chart.heading}: ${chart.bars.length} actions. Arrow keys go from action to action, plus and minus zoom. The table below says the same.`,
+    "aria-label": `${chart.heading}: ${chart.bars.length} actions. Arrow keys move between actions, plus and minus zoom. The table below has the same content.`,
   }, sizer);
   const panel = element("div", { class: "panel", role: "status", "aria-live": "polite" });
   let grouping = chart.chosen, plan = -1, zoom = 1, current = -1, cursor = null;
@@ -166,7 +166,7 @@ function chartView(chart, textOf, onPick, life) {
     chart.plans.length
       ? choose("Plan", [[-1, "all"], ...chart.plans.map((name, index) => [index, name])], plan, (value) => { plan = value; relayout(); })
       : null,
-    chart.bars.some((bar) => bar.starts || bar.ends) ? element("label", {}, spreading, "room for the bands of each action") : null,
+    chart.bars.some((bar) => bar.starts || bar.ends) ? element("label", {}, spreading, "separate bands for each action") : null,
     element("span", { role: "group", "aria-label": "Zoom" },
       element("button", { type: "button", "aria-label": "zoom out", onclick: () => zoomBy(1 / 1.6) }, "−"), " ",
       element("button", { type: "button", "aria-label": "zoom in", onclick: () => zoomBy(1.6) }, "+"), " ",
@@ -210,7 +210,7 @@ function legend(chart) {
     outcome("succeeded", "done"),
     outcome("failed", "failed (crossed)"),
     outcome("cancelled", "cancelled"),
-    outcome("running", "live" in document.documentElement.dataset ? "under way" : "not over when the record ends"),
+    outcome("running", "live" in document.documentElement.dataset ? "running" : "still running at the end of the record"),
     outcome("not-started", "planned, not started"),
     has((bar) => bar.starts) ? entry("may start", ...whisker("starts")) : null,
     has((bar) => bar.ends) ? entry("may end", ...whisker("ends")) : null,
@@ -222,7 +222,7 @@ function legend(chart) {
 function marksList(chart) {
   if (!chart.marks.length) return null;
   const rows = chart.marks.slice(0, 1000).map((mark) => element("li", {}, `${rounded(mark.at, 0.001)}: `, words(mark.name)));
-  return element("details", {}, element("summary", {}, `Deadlines and other moments (${chart.marks.length})`), element("ul", {}, ...rows));
+  return element("details", {}, element("summary", {}, `Deadlines and other events (${chart.marks.length})`), element("ul", {}, ...rows));
 }
 
 // The guarantee over time as a table.

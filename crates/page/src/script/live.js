@@ -48,19 +48,19 @@ function liveView(update) {
   async function ask(what, button) {
     button.disabled = true;
     const answer = await fetch(what, { method: "POST", headers: { authorization: `Bearer ${token}` } }).catch(() => null);
-    const text = answer ? await answer.text() : "the program does not answer";
+    const text = answer ? await answer.text() : "the executive does not answer";
     let words = text.trim();
     try { words = JSON.parse(text).error ?? words; } catch { /* It was no JSON. */ }
     if (!isOver) status.textContent = words;
     button.disabled = answer?.ok ? what === "stop" || what === "cancel" : false;
   }
   const button = (words, title, onclick) => element("button", { type: "button", title, onclick }, words);
-  const pause = token && button("pause", "Nothing more is started; running actions continue", () => ask(data.is_paused ? "resume" : "pause", pause));
-  const cancel = token && button("cancel", "Nothing more is started, and the goal is given up; what is under way ends by itself", () => ask("cancel", cancel));
-  const stop = token && button("stop the run", "What is under way is cancelled, and the run ends", () => ask("stop", stop));
+  const pause = token && button("pause", "No further actions are started; running actions continue", () => ask(data.is_paused ? "resume" : "pause", pause));
+  const cancel = token && button("cancel", "No further actions are started, and the goal is abandoned; running actions continue to their ends", () => ask("cancel", cancel));
+  const stop = token && button("stop the run", "Running actions are cancelled, and the run ends", () => ask("stop", stop));
   const follow = (newer) => {
     update(newer);
-    if (pause) pause.textContent = newer.is_paused ? "go on" : "pause";
+    if (pause) pause.textContent = newer.is_paused ? "continue" : "pause";
   };
   let isStale = false, isBusy = false, isOver = false;
 
@@ -96,9 +96,9 @@ function liveView(update) {
     for (const own of [pause, cancel, stop]) own?.remove();
   });
   events.addEventListener("error", () => {
-    if (!isOver) status.textContent = "The program that runs this does not answer: below is what was heard last.";
+    if (!isOver) status.textContent = "The executive does not answer. The page shows the last known state.";
   });
-  events.addEventListener("open", () => { status.textContent = "The run goes on."; });
-  if (pause && data.is_paused) pause.textContent = "go on";
+  events.addEventListener("open", () => { status.textContent = "The run continues."; });
+  if (pause && data.is_paused) pause.textContent = "continue";
   return element("div", { class: "controls", id: "live" }, status, element("label", {}, following, "follow"), pause, cancel, stop);
 }

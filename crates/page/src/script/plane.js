@@ -18,7 +18,7 @@ function planeView(section, isDriven) {
     } }, ...own.map((it, index) => element("option", { value: index }, `${it.name}: ${it.quantity}`)));
     return { select, node: element("label", {}, label, select) };
   };
-  const choices = [choice("From left to right", 0), choice("Upwards", 1)];
+  const choices = [choice("Horizontal axis", 0), choice("Vertical axis", 1)];
   const svg = shape("svg", { class: "plane", viewBox: `0 0 ${PLANE.left + PLANE.side + 12} ${PLANE.top + PLANE.side + PLANE.below}`, role: "img" });
   const told = element("p", { role: "status", "aria-live": "polite", class: "note", "data-told": true });
   const rows = own.map((it, index) => {
@@ -127,10 +127,10 @@ function planeView(section, isDriven) {
         if (Number.isFinite(low)) return `${rounded(low, 1e-3)} or more`;
         return Number.isFinite(high) ? `${rounded(high, 1e-3)} or less` : "anything";
       });
-      return `With the others as chosen, ${own[axis].name} may be ${spans.length ? spans.join(", or ") : "nothing"}.`;
+      return `With the chosen values of the others, ${own[axis].name} may be ${spans.length ? spans.join(", or ") : "nothing"}.`;
     });
     told.textContent = sentences.join(" ");
-    svg.setAttribute("aria-label", `Where the plan works, by ${own[axes[0]].name} and ${own[axes[1]].name}. ${told.textContent}`);
+    svg.setAttribute("aria-label", `Feasible values of ${own[axes[0]].name} and ${own[axes[1]].name}. ${told.textContent}`);
   }
 
   const swatch = (kind, dashes) => shape("svg", { width: 26, height: 12, "aria-hidden": "true" }, kind === "works"

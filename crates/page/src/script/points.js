@@ -294,6 +294,6 @@ function conflict(count, edges, zero) {
   do { cycle.unshift(from[node]); node = from[node].from; } while (node !== last);
   const said = (isNeed) => [...new Set(cycle.filter((edge) => edge.is_need === isNeed && edge.words).map((edge) => edge.words))];
   const needs = said(true), rooms = said(false);
-  if (!needs.length) return rooms.length ? `${rooms.join(" and ")} cannot be kept` : "happenings of the plan would have to come before themselves";
-  return `${needs.reverse().join(", ")} ${needs.length === 1 ? "does" : "do"} not fit: ${rooms.join(" and ") || "there is no time for it"}`;
+  if (!needs.length) return rooms.length ? `${rooms.join(" and ")} cannot be kept` : "happenings of the plan would have to precede themselves";
+  return `${needs.reverse().join(", ")} ${needs.length === 1 ? "does" : "do"} not fit: ${rooms.join(" and ") || "not enough time"}`;
 }

@@ -65,7 +65,7 @@ function scrubView(chart, textOf, onTime) {
     return details;
   }
 
-  const node = element("section", {}, element("h2", {}, "At one moment"),
+  const node = element("section", {}, element("h2", {}, "State at one time"),
     element("div", { class: "scrub" },
       element("div", { class: "controls" },
         element("label", { for: "time" }, "Time"), output,

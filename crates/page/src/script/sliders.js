@@ -40,7 +40,7 @@ function slidersView(section, textOf, onTimes, onValues) {
     verdict.className = `verdict ${tone}`;
     verdict.dataset.works = found.works;
     verdict.replaceChildren(words(found.works === null
-      ? `Not known here: ${found.words}, and in another order the plan may still work.`
+      ? `Undecided: ${found.words}, but the plan may work in another order.`
       : found.works ? "The plan works with these values." : `The plan fails: ${found.words}.`));
     const spans = found.works ? section.bars.map(([start, end]) => ({
       planned: [found.earliest[start], found.earliest[end]],
@@ -62,12 +62,12 @@ function slidersView(section, textOf, onTimes, onValues) {
       const by = [start, end].map((node) => found.earliest[node] - planned.earliest[node]);
       return { bar, start: by[0], end: by[1] };
     }).filter(({ start, end }) => Math.abs(start) > 1e-9 || Math.abs(end) > 1e-9);
-    if (!moves.length) { moved.replaceChildren(element("p", { class: "note" }, "Nothing moves.")); return; }
+    if (!moves.length) { moved.replaceChildren(element("p", { class: "note" }, "No times change.")); return; }
     const signed = (by) => (Math.abs(by) < 1e-9 ? "0" : `${by > 0 ? "+" : "−"}${rounded(Math.abs(by), 0.001)}`);
     const rows = moves.map(({ bar, start, end }) => element("tr", {}, element("td", {}, words(textOf(section.names[bar]))),
       element("td", { class: "number" }, signed(start)), element("td", { class: "number" }, signed(end))));
-    const heads = ["what moves", "start", "end"].map((name, column) => element("th", { scope: "col", class: column ? "number" : null }, name));
-    moved.replaceChildren(element("div", { class: "wide", tabindex: "0", role: "region", "aria-label": "What moves" },
+    const heads = ["changed", "start", "end"].map((name, column) => element("th", { scope: "col", class: column ? "number" : null }, name));
+    moved.replaceChildren(element("div", { class: "wide", tabindex: "0", role: "region", "aria-label": "Changed times" },
       element("table", { id: "moves" }, element("thead", {}, element("tr", {}, ...heads)), element("tbody", {}, ...rows))));
   }
 
@@ -92,7 +92,7 @@ function slidersView(section, textOf, onTimes, onValues) {
         const middle = (good + bad) / 2n, there = checkPoint(system, at(middle));
         if (there.works) good = middle; else [bad, end] = [middle, there];
       }
-      return `${way} to ${decimal(at(good)[touched])}: works; beyond that breaks first: ${end.words}.`;
+      return `${way} to ${decimal(at(good)[touched])}: works; the first violation beyond: ${end.words}.`;
     });
     limits.replaceChildren(words(`${quantity}. ${sides.filter(Boolean).join(" ")}`));
   }

@@ -65,7 +65,7 @@ function tableView(table, textOf, onBar, onOpen) {
   }
 
   const turn = (name, by) => element("button", { type: "button", onclick: () => { offset += by * ROWS; fill(); } }, name);
-  const before = turn("rows before", -1), after = turn("rows after", 1);
+  const before = turn("previous rows", -1), after = turn("next rows", 1);
   more.addEventListener("click", () => { offset = 0; limit = Infinity; fill(); });
   const search = element("input", { type: "search", "aria-label": `Filter: ${table.heading}`, placeholder: "filter", oninput: () => {
     query = search.value.toLowerCase();

@@ -217,14 +217,11 @@ pub(super) fn describe_closest_point(limits: &[LimitPeriod], points: &Points) ->
     let (time, words) = (nearest(&time), own.describe());
     Some(if room.is_negative() {
         format!(
-            "Beyond a limit at {time}: by {}, and it had to be {words}.",
+            "Limit violated at {time} by {}: it had to be {words}.",
             nearest(&room.abs())
         )
     } else {
-        format!(
-            "Closest to a limit at {time}: {} away from {words}.",
-            nearest(&room)
-        )
+        format!("Least slack at {time}: {} to {words}.", nearest(&room))
     })
 }
 
@@ -347,14 +344,11 @@ mod tests {
             None
         );
         let words = describe_closest_point(&[least(3, 6), least(0, 3)], &points).expect("limits");
-        assert_eq!(
-            words,
-            "Closest to a limit at 3: 2 away from >= 2 during (fly)."
-        );
+        assert_eq!(words, "Least slack at 3: 2 to >= 2 during (fly).");
         let words = describe_closest_point(&[least(0, 9)], &points).expect("limits");
         assert_eq!(
             words,
-            "Beyond a limit at 9: by 2, and it had to be >= 2 during (fly)."
+            "Limit violated at 9 by 2: it had to be >= 2 during (fly)."
         );
     }
 }

@@ -36,7 +36,7 @@ const verdict = (tab) => tab.locator("#verdict").textContent();
 test("the page follows the run to its end, and then says what the report of its trace says", async () => {
   const { address, over } = served(8, "--trace", file("live.jsonl"));
   const tab = await watched(await address);
-  await tab.waitForFunction(() => document.querySelector("#live [role=status]").textContent === "The run goes on.");
+  await tab.waitForFunction(() => document.querySelector("#live [role=status]").textContent === "The run continues.");
   assert.match(await verdict(tab), /^The run continues; its time is /);
   const rows = rowsOf(tab, "Every decision");
   const early = await rows.count();
@@ -88,7 +88,7 @@ test("only who knows the token may stop the run", async () => {
   assert.equal(await looking.getByRole("button", { name: "stop the run" }).count(), 0);
   await close(looking);
   const tab = await watched(base, `#token=${TOKEN}`);
-  await tab.waitForFunction(() => document.querySelector("#live [role=status]").textContent === "The run goes on.");
+  await tab.waitForFunction(() => document.querySelector("#live [role=status]").textContent === "The run continues.");
   await tab.getByRole("button", { name: "stop the run" }).click();
   await tab.waitForFunction(() => document.querySelector("#live [role=status]").textContent === "The run is over.");
   assert.equal((await over).code, 130);
@@ -101,7 +101,7 @@ test("a paused run starts nothing, and goes on when it is told to; its trace rep
   const time = () => tab.evaluate(() => Number(document.getElementById("time").max));
   await tab.getByRole("button", { name: "pause" }).click();
   await tab.waitForFunction(() => document.getElementById("verdict").textContent.startsWith("The run is paused"), null, { timeout: 20_000 });
-  await tab.getByRole("button", { name: "go on" }).waitFor();
+  await tab.getByRole("button", { name: "continue" }).waitFor();
   // What is under way ends; then nothing is, however long one waits.
   const starts = () => fs.readFileSync(file("paused.jsonl"), "utf8").split("\n").filter((line) => line.includes('"event":"command"')).length;
   await tab.waitForTimeout(4500);
@@ -111,13 +111,13 @@ test("a paused run starts nothing, and goes on when it is told to; its trace rep
   assert.ok(before < 5, `${before} commands`);
   // Somebody who comes now sees that it is paused.
   const late = await watched(await address, `#token=${TOKEN}`);
-  await late.getByRole("button", { name: "go on" }).waitFor();
-  await late.getByRole("button", { name: "go on" }).click();
+  await late.getByRole("button", { name: "continue" }).waitFor();
+  await late.getByRole("button", { name: "continue" }).click();
   await close(late);
   await tab.waitForFunction(() => document.getElementById("verdict").textContent.startsWith("The goal was reached"), null, { timeout: 40_000 });
   assert.equal((await over).code, 0);
   assert.ok(await time() > then);
-  assert.equal(await tab.getByRole("button", { name: /pause|go on|cancel/ }).count(), 0);
+  assert.equal(await tab.getByRole("button", { name: /pause|continue|cancel/ }).count(), 0);
   const replay = JSON.parse(run("run", "--json", "--replay", file("paused.jsonl")));
   assert.deepEqual([replay.agrees, replay.complete], [true, true]);
   await close(tab);

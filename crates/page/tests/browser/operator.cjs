@@ -149,7 +149,7 @@ test("an executive or a world that is stopped or killed is shown within three se
   process.kill(world, "SIGSTOP");
   await shows(tab, "warning-list", "the world has not answered for ", 3000);
   const [, words] = (await control(address, "state")).split("\n");
-  assert.match(words, /the world has not answered for [0-9]+ s: nothing is started/);
+  assert.match(words, /the world has not answered for [0-9]+ s: until it does, no action is started/);
   process.kill(world, "SIGCONT");
   await tab.waitForFunction(() => document.getElementById("warnings").hidden, null, { timeout: 20_000 });
   own.child.kill("SIGKILL");
@@ -172,7 +172,7 @@ test("a world that is started again is shown as such", async () => {
   for (let restart = 1; restart <= 2; restart++) {
     const before = worldOf(own);
     process.kill(before, "SIGKILL");
-    const words = `the world is started again (restart ${restart} of 5)`;
+    const words = `the world is restarted (restart ${restart} of 5)`;
     await tab.waitForFunction((words) => window.seen.includes("world restarting: ") && window.seen.includes(words), words, { timeout: 3000 });
     for (let look = 0; look < 100 && [before, NaN, 0].includes(worldOf(own)); look++) await tab.waitForTimeout(100);
   }

@@ -108,7 +108,7 @@ test("a run is shown beside its plan, and any moment of it can be looked at", as
   const lines = fs.readFileSync(file("run.jsonl"), "utf8").trim().split("\n").map((line) => JSON.parse(line));
   const over = lines.at(-1);
   const tab = await open(page("run.html", file("run.jsonl")));
-  const cells = await cellsOf(rowsOf(tab, "Planned and done"));
+  const cells = await cellsOf(rowsOf(tab, "Planned and actual times"));
   assert.equal(cells.length, over.executed.length);
   for (const [index, done] of over.executed.entries()) {
     assert.equal(cells[index][0], done.action);
@@ -136,7 +136,7 @@ test("a run is shown beside its plan, and any moment of it can be looked at", as
   await slider.press("ArrowRight");
   assert.ok(Number(await slider.inputValue()) > 0);
   // Each decision is in the log, with its reason.
-  const log = await cellsOf(rowsOf(tab, "What happened, and why"));
+  const log = await cellsOf(rowsOf(tab, "Events and reasons"));
   const decided = lines.filter((line) => line.event === "decided");
   const rows = log.filter((row) => row[1] === "decision");
   assert.deepEqual(rows.map((row) => row[4]), decided.map((line) => line.reason.words));
@@ -151,15 +151,15 @@ test("numbers over time are drawn with what conditions allowed", async () => {
   assert.ok(await curves.first().locator("line.limit").count() > 0);
   const closest = await curves.first().locator("[data-closest]").textContent();
   // All went as planned: no limit was broken.
-  assert.match(closest, /^Closest to a limit at [0-9.]+: [0-9.]+ away from [<>]=? [0-9.]+ (at the start of|during|at the end of) \(/);
+  assert.match(closest, /^Least slack at [0-9.]+: [0-9.]+ to [<>]=? [0-9.]+ (at the start of|during|at the end of) \(/);
   await close(tab);
 });
 
 test("a table is filtered by what is typed", async () => {
   const tab = await open(file("run.html"));
-  const rows = rowsOf(tab, "What happened, and why");
+  const rows = rowsOf(tab, "Events and reasons");
   const all = await rows.count();
-  await tab.getByLabel("Filter: What happened, and why").fill("has succeeded");
+  await tab.getByLabel("Filter: Events and reasons").fill("has succeeded");
   const some = await cellsOf(rows);
   assert.ok(some.length > 0 && some.length < all);
   assert.ok(some.every((row) => row.join(" ").includes("has succeeded")));
@@ -305,9 +305,9 @@ test("the page of a region says how far two quantities may go, whatever the othe
     assert.ok(Math.abs(from - low) < 0.002 && Math.abs(to - high) < 0.002, `${name}: ${rooms[index]}, not ${low} to ${high}`);
   }
   assert.equal(await tab.locator("polygon.works").count(), 1);
-  const shares = await cellsOf(rowsOf(tab, "How much of it is in a box"));
+  const shares = await cellsOf(rowsOf(tab, "Share of the region in each box"));
   assert.deepEqual(shares.map(([, share]) => share), boxes.map((it) => `${(100 * it.share.decimal).toFixed(2)} %`));
-  const rows = await cellsOf(rowsOf(tab, "What the values satisfy"));
+  const rows = await cellsOf(rowsOf(tab, "Inequalities"));
   assert.deepEqual(rows.map((row) => row[0]), pieces[0].rows.map((row) => row.text));
   await tab.getByRole("button", { name: "as planned" }).click();
   values.dur_4 = parameters[4].nominal.decimal;
@@ -411,7 +411,7 @@ test("a long run loads, and its log follows the slider", async () => {
   const many = Array.from({ length: 3000 }, () => decided).flat();
   fs.writeFileSync(file("long.jsonl"), [lines[0], lines[1], ...many, ...lines.slice(2)].join("\n"));
   const tab = await open(page("long.html", file("long.jsonl")));
-  const rows = rowsOf(tab, "What happened, and why");
+  const rows = rowsOf(tab, "Events and reasons");
   assert.equal(await rows.count(), 200);
   const times = await tab.evaluate(() => {
     const slider = document.getElementById("time"), times = [];

@@ -42,7 +42,7 @@ test("a run", async () => {
   process.chdir(path.dirname(file("run.jsonl")));
   run("run", ...pddl("delivery"), "--world", path.join(cases, "delivery", "world.toml"), "--seed", "10", "--trace", "run.jsonl");
   const tab = await open(page("run.html", "run.jsonl"), { viewport: { width: 900, height: 700 }, deviceScaleFactor: 1.5 });
-  await picture(tab, "run.png", "At one moment");
+  await picture(tab, "run.png", "State at one time");
   await close(tab);
 });
 

@@ -87,7 +87,7 @@ test("it says how far a slider can go, and beyond that the command says that the
   const slider = tab.locator(".slider input").first();
   await slider.focus();
   await slider.press("ArrowRight");
-  await tab.waitForFunction(() => document.getElementById("limits").textContent.includes("breaks first"));
+  await tab.waitForFunction(() => document.getElementById("limits").textContent.includes("first violation beyond"));
   const limit = Number(/Up to ([\d.]+): works; beyond/.exec(await tab.locator("#limits").textContent())[1]);
   const step = Number(await slider.getAttribute("step"));
   for (const [value, works] of [[limit, true], [limit + step, false]]) {

@@ -23,13 +23,13 @@ const SUPPORTED: &[(&str, &str)] = &[
     ),
     (
         "Numeric fluents",
-        "`assign`, `increase`, `decrease`, `scale-up`, `scale-down`; `+ - * /` with any number of operands where that makes sense; exact numbers",
+        "`assign`, `increase`, `decrease`, `scale-up`, `scale-down`; `+ - * /` with any number of operands where applicable; exact numbers",
     ),
     (
         "Conditional and quantified effects",
         "`when`, `forall`, nested; also in durative actions, with conditions at start, over all and at end for effects at end",
     ),
-    ("Instantaneous actions", "beside durative ones"),
+    ("Instantaneous actions", "together with durative ones"),
     (
         "Durative actions",
         "conditions and effects at start, over all, at end; `forall` around time specifiers; `or`, `not`, `exists` over parts of one time",
@@ -45,12 +45,12 @@ const SUPPORTED: &[(&str, &str)] = &[
     (
         "Timed initial literals and fluents",
         "`(at 10 (p))`, `(at 10 (not (p)))`, `(at 10 (= (f) 3))`; two that contradict each other at \
-         one time are a mistake in the problem; the goal counts after all of them",
+         the same time are an error in the problem; the goal is evaluated after all of them",
     ),
     ("Derived predicates", "stratified rules"),
     (
         "Processes and events",
-        "PDDL+ `:process` and `:event`, grounded, judged and heeded by envelopes \
+        "PDDL+ `:process` and `:event`, grounded, validated and respected by envelopes \
          ([how](#processes-and-events)); \
          `:constraint`, which must hold in each state",
     ),
@@ -67,7 +67,7 @@ const SUPPORTED: &[(&str, &str)] = &[
     ),
     (
         "Metrics",
-        "read; they have no bearing on validity; `(is-violated name)` counts the violated \
+        "read; they do not affect validity; `(is-violated name)` counts the violated \
          instances of a preference",
     ),
     (
@@ -77,72 +77,72 @@ const SUPPORTED: &[(&str, &str)] = &[
     (
         "Control parameters",
         "`:control (?cash - number)` of an action: numbers that the plan chooses. In a plan they \
-         stand behind the objects: `0.0: (withdraw ann 12.5) [2]`. Read and judged; planner, \
-         networks, envelopes, repairs, odds and runs refuse such domains by name",
+         follow the objects: `0.0: (withdraw ann 12.5) [2]`. Read and validated; planner, \
+         networks, envelopes, repairs, odds and runs reject such domains by name",
     ),
     (
         "Object fluents",
         "functions whose values are objects (PDDL 3.1), as predicates with the value as last \
          argument: `(= (f a) v)`, `(assign (f a) v)`, `undefined`, and `(change (f a) v)` of TFD, \
          which leaves no value while a durative action runs; in conditions, `(f a)` may stand as an \
-         argument. All that treats predicates treats them",
+         argument. All features for predicates apply to them",
     ),
 ];
 
 /// Semantics of constraints where papers and programs leave it open.
 const CONSTRAINTS: &str = "\n## Constraints and preferences\n
-The meaning is that of Gerevini, Haslum, Long, Saetti & Dimopoulos (*Deterministic planning in the \
-fifth international planning competition*, AIJ 173, 2009): a constraint looks at the sequence of \
-states that a plan goes through.
+The semantics are those of Gerevini, Haslum, Long, Saetti & Dimopoulos (*Deterministic planning in the \
+fifth international planning competition*, AIJ 173, 2009): a constraint is evaluated on the sequence of \
+states of a plan.
 
-- The state at a moment is the one after all that happens then. Before anything happens, the \
-  initial state counts as a state of its own.
-- What holds in the end, after the last happening and all timed initials, holds for ever: \
-  `hold-during` and `hold-after` may reach beyond the end of the plan.
-- `hold-during t u` and `hold-after t` also ask about the state that holds at `t`, which may have \
-  begun earlier. (VAL looks only at the first state that begins in the window: [agreement with VAL](val-agreement.md#beside-val-itself).)
-- Where numbers change continuously, every moment counts, not only those of happenings. Moments \
-  are compared exactly; two of them less than a millionth apart, one of them irrational, leave the \
-  constraint undecided.
-- Constraints do not nest. In `(preference p (and c d))`, `p` is violated once if `c` or `d` is; in \
+- The state at a time is the one after all happenings at that time. The initial state before all \
+  happenings is a separate state.
+- The state after the last happening and all timed initials lasts forever: `hold-during` and \
+  `hold-after` may extend beyond the end of the plan.
+- `hold-during t u` and `hold-after t` also apply to the state that holds at `t`, which may have \
+  begun earlier. (VAL starts with the first state that begins in the window: [agreement with VAL](val-agreement.md#beside-val-itself).)
+- Where numbers change continuously, all times count, not only those of happenings. Times are \
+  compared exactly; if two of them are less than a millionth apart and one is irrational, the \
+  constraint is undecided.
+- Constraints cannot be nested. In `(preference p (and c d))`, `p` is violated once if `c` or `d` is; in \
   `(forall (?x) (preference p …))` there is an instance for each object. A preference that reads a \
   number without a value is violated.
-- A plan that breaks a constraint is invalid, and the judge says since when and why. In \
-  mid-execution, what has been so far is not known: the judge says that it cannot tell.
+- A plan that violates a constraint is invalid, and the validator reports the time and the reason. In \
+  mid-execution, the past states are unknown, so that constraints are undecided.
 - The embedded planner finds plans under all forms \
-  ([how](planners-embedded.md#constraints-on-the-course)). Networks and envelopes respect those on facts: what changes them keeps its order, and \
-  deadlines become bounds. Whatever does not heed constraints refuses them by name: runs and other \
-  plans in mid-execution, STN plan files, odds.
+  ([details](planners-embedded.md#constraints-on-the-course)). Networks and envelopes respect constraints on facts: the happenings that change them keep their order, and \
+  deadlines become bounds. Runs and other plans in mid-execution, STN plan files and odds do not \
+  support constraints, and reject them by name.
 
 ";
 
 /// Semantics of processes and events, and the planners and executors that account for them.
 const AUTONOMOUS: &str = "\n## Processes and events\n
-The meaning is that of Fox & Long (*Modelling mixed discrete-continuous domains for planning*, JAIR \
+The semantics are those of Fox & Long (*Modelling mixed discrete-continuous domains for planning*, JAIR \
 27, 2006).
 
-- A process is at work whenever its condition holds, from the initial state on. Its effects are \
+- A process is active whenever its condition holds, from the initial state on. Its effects are \
   `(increase (f) (* #t rate))` and `(decrease …)`, without `when`. Rates of processes and of actions \
   add up.
-- An event happens as soon as its condition holds: after the happening, or the other event, that \
-  makes it true, and before what the plan does at that moment. Where a condition holds only right \
-  after a moment, as `(> (x) 3)` does when `x` rises through 3, it happens right after it.
-- An event happens once at a moment. One whose effects leave its precondition true, or two that make \
-  each other's true again, would happen without end: the plan is invalid, and the judge names the \
-  event. So it is where two events that interfere happen at one moment.
-- What the plan does keeps ε away from an event before it that it interferes with.
-- The moments of events, and of processes that start and stop, are zeros of polynomials, and are \
-  compared exactly, irrational ones too. A number that changes its course, or stops, at an \
-  irrational moment with an irrational value is not kept: if something reads it, the plan is \
+- An event happens as soon as its condition holds: after the happening or other event that \
+  makes it true, and before the plan's happenings at that time. If a condition holds only right \
+  after a time, as `(> (x) 3)` does when `x` rises through 3, the event happens right after it.
+- An event happens once at a time. An event whose effects leave its precondition true, or two events that make \
+  each other's true again, would happen endlessly: the plan is invalid, and the validator names the \
+  event. The same holds for two events that interfere at the same time.
+- The plan's happenings must be ε later than an event with which they interfere.
+- The times of events, and of starts and stops of processes, are zeros of polynomials, and are \
+  compared exactly, also if they are irrational. A number whose course changes or stops at an \
+  irrational time with an irrational value is not represented: if a condition or effect reads it, the plan is \
   undecided.
-- Undecided, with the reason, are also: rates that depend on their own fluent (air resistance); a \
-  process that would start and stop without end; more than 1000 events and turns of processes \
+- Also undecided, with the reason: rates that depend on their own fluent (air resistance); a \
+  process that would start and stop endlessly; more than 1000 events, starts and stops of processes \
   between two happenings of the plan.
 - A `:constraint` (of the dialect of ENHSP) is `(always condition)` for all its parameters.
-- `elbowroom envelope` heeds them where their order is known and their moments are linear, and says \
-  what stands in the way elsewhere ([how](guarantees.md#processes-and-events)). The embedded planner, \
-  networks of plans, largest and exact envelopes, repairs, odds and runs refuse such domains by name. \
-  External planners can be used, and their plans are judged.
+- `elbowroom envelope` accounts for events whose order is known and whose times are linear, and reports \
+  the obstacle otherwise ([details](guarantees.md#processes-and-events)). The embedded planner, \
+  networks of plans, largest and exact envelopes, repairs, odds and runs reject such domains by name. \
+  External planners can be used, and their plans are validated.
 
 ";
 
@@ -152,12 +152,12 @@ pub(crate) fn document(survey: Option<&Survey>) -> String {
         "# PDDL support\n\n\
          <!-- Written by `cargo run --release -p elbowroom-pddl --example pddl_support`. -->\n\n\
          PDDL 2.1 levels 1 to 4, with the timed initial literals and derived predicates of PDDL \
-         2.2, and processes and events (PDDL+). Requirement flags switch nothing on or off.\n\n## Executed\n\n",
+         2.2, and processes and events (PDDL+). Requirement flags have no effect.\n\n## Executed\n\n",
     );
     for (name, what) in SUPPORTED {
         line(&mut text, format_args!("- **{name}**: {what}"));
     }
-    text.push_str("\n## Refused or ignored\n\nA refusal names the feature and its place. What is ignored never affects validity.\n\n");
+    text.push_str("\n## Refused or ignored\n\nRejections name the feature and its place. Ignored features never affect validity.\n\n");
     for feature in Feature::ALL {
         line(
             &mut text,
@@ -180,8 +180,8 @@ fn benchmarks(survey: &Survey, text: &mut String) {
     line(
         text,
         format_args!(
-            "\n## Benchmarks\n\nOf {instances} instances {read} are read, and {grounded} of these \
-             made ground; of the {plans} plans for them, {plans_read} are read. The instances that \
+            "\n## Benchmarks\n\n{read} of {instances} instances are read, and {grounded} of these \
+             are grounded; {plans_read} of their {plans} plans are read. The instances that \
              are not read, by reason:\n"
         ),
     );
@@ -191,8 +191,8 @@ fn benchmarks(survey: &Survey, text: &mut String) {
     }
     text.push_str("\n### By domain\n\n");
     text.push_str(
-        "*Ground* counts the problems made ground, *actions* the ground actions that can be \
-         reached in them, all together.\n\n",
+        "*Ground* counts the grounded problems, *actions* their reachable ground actions \
+         in total.\n\n",
     );
     text.push_str("|domain|instances|read|ground|actions|refused|why|\n");
     text.push_str("|---|---:|---:|---:|---:|---:|---|\n");
@@ -211,7 +211,7 @@ fn benchmarks(survey: &Survey, text: &mut String) {
             ),
         );
     }
-    text.push_str("\n### Mistakes in the files\n\nThe first mistake of each file; refused features beside them are not shown.\n\n");
+    text.push_str("\n### Mistakes in the files\n\nThe first error of each file; rejected features are not listed.\n\n");
     for domain in &survey.domains {
         let mut shown = BTreeMap::new();
         for (path, errors) in &domain.refused {

@@ -166,7 +166,7 @@ fn unanswered_request_lists_known_performers() {
     let mut scene = Fixture::new();
     scene.begin(1, "pick r box");
     scene.after(31, Some(("robot1", state::READY)));
-    let why = "no performer answered within 30 s; performers that were heard: robot1 (move)";
+    let why = "no performer answered within 30 s; discovered performers: robot1 (move)";
     assert_eq!(scene.outcomes(1), [&failed(why)]);
     scene.says(kind::RESPONSE, "robot2", "pick r box");
     assert_eq!(scene.last_sent(), (kind::REJECT, "robot2"));
@@ -188,7 +188,7 @@ fn a_failure_has_the_reason_that_the_performer_gives() {
     scene.begin(2, "move r a b");
     scene.says(kind::RESPONSE, "robot1", "move r a b");
     scene.says_more(kind::FINISH, "robot1", "move r a b", false, "");
-    assert_eq!(scene.outcomes(2)[1], &failed("robot1 has not said why"));
+    assert_eq!(scene.outcomes(2)[1], &failed("robot1 gave no reason"));
 }
 
 #[test]
@@ -212,7 +212,7 @@ fn silent_performer_is_named_and_cancelled() {
     scene.after(20, Some(("robot1", state::RUNNING)));
     assert_eq!(scene.outcomes(1), [&ActionUpdate::Started]);
     scene.after(6, None);
-    let why = "robot1 is lost: nothing was heard of it for 5 s";
+    let why = "robot1 is lost: no message from it for 5 s";
     assert_eq!(scene.outcomes(1)[1..], [&failed(why)]);
     assert_eq!(scene.last_sent(), (kind::CANCEL, "robot1"));
     scene.says(kind::FINISH, "robot1", "move r a b");
@@ -247,7 +247,7 @@ fn a_performer_that_does_nothing_has_lost_a_word() {
     scene.after(3, Some(("robot1", state::READY)));
     assert_eq!(scene.outcomes(1), [&ActionUpdate::Started]);
     scene.after(1, Some(("robot1", state::READY)));
-    let why = "robot1 does nothing, and has not said how this has ended";
+    let why = "robot1 is idle, and has not reported the outcome";
     assert_eq!(scene.outcomes(1)[1..], [&failed(why)]);
     assert_eq!(scene.last_sent(), (kind::CANCEL, "robot1"));
 }

@@ -261,7 +261,7 @@ fn a_problem_expert_with_another_problem_is_left_alone() {
     assert!(expert.received.is_empty() && mirror.seen().is_empty() && mirror.is_idle());
     assert_eq!(
         mirror.remarks(),
-        ["the problem expert has nothing of this problem, and is left alone"]
+        ["the problem expert contains nothing of this problem, and is not used"]
     );
 }
 
@@ -276,7 +276,7 @@ fn refused_write_is_reported_and_not_repeated() {
     expert.talk(&mut mirror, at(2));
     assert_eq!(
         mirror.remarks(),
-        ["the problem expert does not take (at r b): it is not valid"]
+        ["the problem expert rejects (at r b): it is not valid"]
     );
     assert_eq!(expert.received, ["update charge r 2"]);
     assert_eq!(mirror.seen(), []);

@@ -1,13 +1,13 @@
-"""An action interface on real ROS 1, as ROSPlan's are: it hears what is dispatched, and says how it stands.
+"""An action interface on real ROS 1, like those of ROSPlan: receives dispatched actions and reports their status.
 
-`interface.py NAME '{"action": "move", "lasts": 2}' LOG` runs until it is ended. LOG gets a line of JSON for each thing
-that it was told or did, with the time. It may have
+`interface.py NAME '{"action": "move", "lasts": 2}' LOG` runs until it is stopped. LOG gets a line of JSON with the time
+for each received message and each step of an action. Optional members:
 
     lasts      seconds of work
-    only       the value of its first parameter; it does nothing for others
-    fails      it fails, with this text as its reason
-    refuses    it says that a precondition is false, and does not begin (newer messages alone have a word for it)
-    repeats    how often it says that it has ended
+    only       the value of its first parameter; actions with other values are ignored
+    fails      the action fails, with this text as the reason
+    refuses    reports a false precondition and does not start (only newer messages have a status for this)
+    repeats    number of reports of the end
 """
 
 import json

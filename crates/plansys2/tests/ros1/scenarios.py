@@ -1,9 +1,9 @@
 """Runs of Elbowroom with action interfaces on real ROS 1 (`interface.py`), through `examples/rosplan_world.py`.
 
-`scenarios.py ELBOWROOM [SCENARIO...]` with a Python that has rospy, genpy and diagnostic_msgs; `.ci/ros1` finds one. The
-messages of ROSPlan are our own files, `texts` and `numbers`, as older and newer versions of it have them; every scenario is
-played with both, each with a `roscore` of its own. What is said in scenarios that are named is shown, too. No limit here is
-about speed.
+`scenarios.py ELBOWROOM [SCENARIO...]` needs a Python with rospy, genpy and diagnostic_msgs; `.ci/ros1` finds one. ROSPlan's
+messages are defined in the folders `texts` and `numbers`, for its older and newer versions. Each scenario is run with both,
+each with a `roscore` of its own. For scenarios named on the command line, all output is shown. There are no limits on
+speed.
 """
 
 import json
@@ -36,7 +36,7 @@ DRIVERS = {
 
 
 def compiled(version, folder):
-    """The messages of that version, as modules of Python in a folder."""
+    """Generates the messages of a version as Python modules in a folder."""
     package = "rosplan_dispatch_msgs"
     files = [os.path.join(HERE, version, it) for it in sorted(os.listdir(os.path.join(HERE, version)))]
     target = os.path.join(folder, version, package, "msg")
@@ -48,7 +48,7 @@ def compiled(version, folder):
 
 
 class Stage:
-    """A place of its own for one scenario: a master, and action interfaces."""
+    """Environment of one scenario: a master and action interfaces."""
 
     def __init__(self, messages, version, port, folder):
         self.version, self.folder = version, folder
@@ -107,7 +107,7 @@ class Stage:
             return [json.loads(line) for line in file if line.endswith("\n")]
 
     def when(self, event, action):
-        """The only time at which that happened."""
+        """Returns the time of an event that must have happened exactly once."""
         (at,) = [it["at"] for it in self.log() if (it["event"], it["action"]) == (event, action)]
         return at
 
@@ -142,7 +142,7 @@ def two_robots_at_a_time(stage):
 
 
 def required_concurrency(stage):
-    """The match cellar: what is done by the light must lie within it."""
+    """The match cellar: actions that need light must lie within the burning match."""
     stage.begin({"flare": {"action": "burn", "lasts": 3.0}, "diver": {"action": "inspect", "lasts": 0.9}})
     stage.play(MATCH, "--executor", "live", speed=10)
     assert stage.code == 0 and "goal reached" in stage.out
@@ -242,7 +242,7 @@ def main():
         with ThreadPoolExecutor(AT_A_TIME) as pool:
             numbered = enumerate(plays)
             went_well = list(pool.map(lambda it: play(it[0], *it[1], messages[it[1][1]]), numbered))
-    print(f"{sum(went_well)} of {len(went_well)} scenarios went as they should")
+    print(f"{sum(went_well)} of {len(went_well)} scenarios passed")
     sys.exit(0 if all(went_well) else 1)
 
 

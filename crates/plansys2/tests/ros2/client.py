@@ -1,7 +1,7 @@
-"""A client of PlanSys2's planner and executor on real ROS 2, such as its terminal and its Python clients are.
+"""A client of PlanSys2's planner and executor on real ROS 2, like its terminal and its Python clients.
 
-`client.py DOMAIN PROBLEM [CANCEL_AFTER]` has a plan made and executed, and prints what it was told as a document of JSON.
-Where a problem expert is there, it is asked for its facts and numbers as soon as the plan has ended.
+`client.py DOMAIN PROBLEM [CANCEL_AFTER]` requests a plan and its execution, and prints the answers as a JSON document.
+If there is a problem expert, its facts and numbers are requested as soon as the plan has ended.
 """
 
 import json
@@ -37,7 +37,7 @@ STATUSES = {GoalStatus.STATUS_SUCCEEDED: "succeeded", GoalStatus.STATUS_CANCELED
 
 
 def note(what):
-    """Tells what has been done, and when: where something takes long, this says where."""
+    """Logs a completed step with its time, to locate delays."""
     print(f"{time.monotonic() - BEGUN:6.2f} s: {what}", file=sys.stderr, flush=True)
 
 
@@ -75,24 +75,24 @@ class Client:
         return self.call(f"{node}/change_state", transition=Transition(id=transition)).success
 
     def executed(self):
-        """The plan that is executed, and what is left of it; or why there is none."""
+        """Returns the executed plan and the remaining plan, or the reason why there is none."""
         answers = [self.call(f"executor/{it}", domain="", problem="") for it in ("get_plan", "get_remaining_plan")]
         return [[it.action for it in told.plan.items] if told.success else told.error_info for told in answers]
 
     def sub_goals(self):
-        """The parts of the goal in their order; or why there are none."""
+        """Returns the subgoals in their order, or the reason why there are none."""
         told = self.call("executor/get_ordered_sub_goals")
         return [text(it.nodes, 0) for it in told.sub_goals] if told.success else told.error_info
 
     def known(self):
-        """The facts and numbers of the problem expert, if it is there."""
+        """Returns the facts and numbers of the problem expert, if there is one."""
         if not all(it.service_is_ready() for it in self.states):
             return None
         facts, numbers = (self.spin(it.call_async(GetStates.Request())).states for it in self.states)
         return [sorted(named(it) for it in facts), {named(it): it.value for it in numbers}]
 
     def execute(self, plan, cancel_after=None):
-        """What became of it, and how often there was feedback."""
+        """Executes a plan; returns the result and the number of feedback messages."""
         client = self.executing
         assert client.wait_for_server(timeout_sec=PATIENCE), "execute_plan is not there"
         feedback, asked = [], None
@@ -127,7 +127,7 @@ def named(node):
 
 
 def text(nodes, place):
-    """As PDDL writes it."""
+    """Formats a tree as PDDL."""
     node = nodes[place]
     assert node.node_id == place
     heads = {node.AND: "and", node.OR: "or", node.NOT: "not"}

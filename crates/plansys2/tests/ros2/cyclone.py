@@ -1,8 +1,10 @@
-"""A client on Cyclone DDS that asks as ROS does there: `rmw_cyclonedds` puts who has asked, and the number of the question, before
-each request, and takes the answers that begin with that.
+"""A client on Cyclone DDS with the request format of `rmw_cyclonedds`.
 
-`cyclone.py DOMAIN PROBLEM` asks for the state of the executor, for a plan, and for one of half a domain, and prints what it was told
-as a document of JSON.
+Each request begins with the id of the client and the sequence number. The client accepts the replies that begin with the
+same values.
+
+`cyclone.py DOMAIN PROBLEM` requests the state of the executor, a plan, and a plan for half a domain, and prints the
+answers as a JSON document.
 """
 
 import json

@@ -1,5 +1,5 @@
-"""`expert.py` on Cyclone DDS, serving as ROS does there: each request begins with who has asked and the number of the question, and so
-does its answer.
+"""`expert.py` on Cyclone DDS with the request format of `rmw_cyclonedds`: requests and replies begin with the id of the
+client and the sequence number.
 """
 
 import json

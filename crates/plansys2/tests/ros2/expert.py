@@ -1,11 +1,11 @@
-"""A problem expert on real ROS 2, with what a run needs of PlanSys2's: facts and numbers to be asked for and changed.
+"""A problem expert on real ROS 2, with the part of PlanSys2's that a run needs: reads and changes of facts and numbers.
 
-`expert.py '{"facts": ["at r1 shed"], "numbers": {"trips r1": 0}}' LOG` runs until it is ended. LOG gets a line of JSON for
-each change, with all that it has then. It may have
+`expert.py '{"facts": ["at r1 shed"], "numbers": {"trips r1": 0}}' LOG` runs until it is stopped. LOG gets a line of JSON
+for each change, with the complete state after it. Optional members:
 
-    refuses    a fact that it does not take
-    then       what somebody else changes as soon as `when` was done: {"when": "add at r2 gate", "then": ["add at r2 barn"]}
-    mute       it is there, and never answers
+    refuses    a fact that it rejects
+    then       changes by another client as soon as `when` has happened: {"when": "add at r2 gate", "then": ["add at r2 barn"]}
+    mute       it exists, but never answers
 """
 
 import json
@@ -26,7 +26,7 @@ PREDICATE, FUNCTION = 5, 6
 
 
 class Knowledge:
-    """What it knows, and what is changed of that; `notify` tells others."""
+    """State of the problem expert; `notify` publishes changes."""
 
     def __init__(self, spec, log, notify):
         self.spec, self.log, self.notify = spec, log, notify
@@ -34,7 +34,7 @@ class Knowledge:
         self.then = list(spec.get("then", []))
 
     def affect(self, name, node):
-        """Whether that was done."""
+        """Applies a change; returns `True` if it was accepted."""
         word = " ".join([node.name, *(it.name for it in node.parameters)])
         what = name.split("_")[0]
         is_fact = name.endswith("predicate")

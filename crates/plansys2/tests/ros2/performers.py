@@ -1,16 +1,16 @@
-"""Performers of actions on real ROS 2, as PlanSys2's are: they answer a request when they are idle, work when
-they are confirmed, and say each second how they are.
+"""Action performers on real ROS 2, like those of PlanSys2: they answer requests while idle, work after a confirmation, and
+publish their status every second.
 
-`performers.py '{"driver": {"action": "move", "lasts": 2}}' LOG` runs until it is ended. LOG gets a line of JSON for
-each thing that a performer was told or did, with the time. Each performer may have
+`performers.py '{"driver": {"action": "move", "lasts": 2}}' LOG` runs until it is stopped. LOG gets a line of JSON with the
+time for each message that a performer receives and each of its steps. Optional members of a performer:
 
     lasts      seconds of work
-    only       the first argument that it takes; it does not answer for others
-    fails      it ends with this text instead of success
-    repeats    how often it says FINISH
-    dies       it says nothing any more, so many seconds after it has begun
-    deaf       it does not stop when it is told to
-    mute       it never says FINISH
+    only       the first argument that it accepts; requests with other arguments are ignored
+    fails      the action ends with this text instead of success
+    repeats    number of FINISH messages
+    dies       it sends no messages from this number of seconds after its start on
+    deaf       it ignores cancellations
+    mute       it never sends FINISH
 """
 
 import json

@@ -1,9 +1,10 @@
 """Runs of Elbowroom with performers on real ROS 2 (`performers.py`), through the program `elbowroom-plansys2` and
 through `examples/plansys2_world.py`.
 
-`scenarios.py ELBOWROOM ELBOWROOM_PLANSYS2 [SCENARIO...]` in a shell in which rclpy and plansys2_msgs can be imported;
-`.ci/ros2` makes one. What is said in scenarios that are named is shown, too. Each scenario has a DDS domain of its own, so that several are played at a time. No limit here is about speed:
-on a slow machine everything takes longer, and nothing fails for it.
+`scenarios.py ELBOWROOM ELBOWROOM_PLANSYS2 [SCENARIO...]` needs a shell in which rclpy and plansys2_msgs can be imported;
+`.ci/ros2` makes one. For scenarios named on the command line, all output is shown. Each scenario has a DDS domain of its
+own, so that several can run concurrently. There are no limits on speed: on a slow machine the scenarios take longer, but
+do not fail.
 """
 
 import json
@@ -34,7 +35,7 @@ DRIVERS = {
 
 
 class Stage:
-    """A place of its own for one scenario."""
+    """Environment of one scenario."""
 
     def __init__(self, world, domain_id, folder):
         self.world, self.folder = world, folder
@@ -46,7 +47,7 @@ class Stage:
         return subprocess.Popen(command, env=self.environment, text=True, **more)
 
     def play(self, performers, files, *options, speed=1, interrupt_after=None, command="run"):
-        """Elbowroom, among these performers; until it ends, or is told to `interrupt_after` an event."""
+        """Runs Elbowroom with these performers until it ends, or interrupts it after the event `interrupt_after`."""
         self.environment["ELBOWROOM_SPEED"] = str(speed)
         script = os.path.join(HERE, "performers.py")
         there = self.start([sys.executable, script, json.dumps(performers), self.log_file])
@@ -73,7 +74,7 @@ class Stage:
         return self
 
     def wait_for(self, what, holds, *while_there):
-        """Waits until something holds, as long as the processes are there that are to bring it about."""
+        """Waits for a condition while the processes that should cause it are running."""
         until = time.monotonic() + PATIENCE
         while not holds():
             for process in while_there:
@@ -85,7 +86,7 @@ class Stage:
             time.sleep(0.05)
 
     def hear(self, process):
-        """What a process has said, once it has ended."""
+        """Reads the output of a process until its end."""
         try:
             self.out, self.errors = process.communicate(timeout=PATIENCE)
         except subprocess.TimeoutExpired:
@@ -96,7 +97,7 @@ class Stage:
             self.code = process.returncode
 
     def settle(self):
-        """The performers write down what they were told last."""
+        """Waits until the performers log no more messages."""
         known = None
         while known != (known := self.log()):
             time.sleep(0.5)
@@ -112,7 +113,7 @@ class Stage:
         return [it["event"] for it in self.log()]
 
     def when(self, event, action):
-        """The only time at which that happened."""
+        """Returns the time of an event that must have happened exactly once."""
         (at,) = [it["at"] for it in self.log() if (it["event"], it["action"]) == (event, action)]
         return at
 
@@ -151,7 +152,7 @@ def two_robots_at_a_time(stage):
 
 
 def required_concurrency(stage):
-    """The match cellar: what is done by the light must lie within it."""
+    """The match cellar: actions that need light must lie within the burning match."""
     crew = {"flare": {"action": "burn", "lasts": 3.0}, "diver": {"action": "inspect", "lasts": 0.9}}
     stage.play(crew, MATCH, "--executor", "live", speed=10)
     assert stage.code == 0 and "goal reached" in stage.out
@@ -185,11 +186,11 @@ def a_failure_has_its_reason(stage):
 def a_performer_is_lost(stage):
     crew = {**DRIVERS, "driver1": dict(DRIVERS["driver1"], dies=0.5)}
     stage.play(crew, YARD)
-    assert stage.code == 1 and "driver1 is lost: nothing was heard of it for 5 s" in stage.trace()
+    assert stage.code == 1 and "driver1 is lost: no message from it for 5 s" in stage.trace()
 
 
 def a_performer_never_says_that_it_has_ended(stage):
-    """It is told to cancel when no plan can bear it any longer, and does."""
+    """An overdue action is cancelled when no plan tolerates it any longer, and stops."""
     crew = {"flare": {"action": "burn", "lasts": 3.0}, "diver": {"action": "inspect", "lasts": 0.9, "mute": True}}
     stage.play(crew, MATCH, speed=10)
     assert stage.code in NO_PLAN and "told to cancel" in stage.events()
@@ -197,7 +198,7 @@ def a_performer_never_says_that_it_has_ended(stage):
 
 
 def what_is_late_has_its_reason(stage):
-    """A deviation is seen when the interval that the plan can bear is left, and is told with that interval."""
+    """A deviation is detected when the interval of the envelope is left, and reported with that interval."""
     crew = {"flare": {"action": "burn", "lasts": 3.0}, "diver": {"action": "inspect", "lasts": 2.2}}
     stage.play(crew, MATCH, speed=10)
     assert stage.code in NO_PLAN and "inspect hull" in stage.out and "allowed" in stage.trace()
@@ -220,12 +221,12 @@ def the_protocol_is_kept(stage):
 def a_missing_performer_is_named(stage):
     stage.world += " --needs move,signal --within 8"
     stage.play({"driver": {"action": "move", "lasts": 1}}, YARD)
-    assert stage.code == 2 and "no performer of signal was heard within 8 s; heard: driver (move)" in stage.errors
+    assert stage.code == 2 and "no performer of signal was discovered within 8 s; discovered: driver (move)" in stage.errors
     assert stage.log() == []
 
 
 def begin_expert(stage, script="expert.py", **more):
-    """A problem expert that has what the problem of the yard says, but for a number."""
+    """A problem expert with the content of the yard problem, except for one number."""
     spec = {"facts": ["at r1 shed", "at r2 barn"], "numbers": {"trips r1": 0}, **more}
     stage.expert_file = os.path.join(stage.folder, "expert.jsonl")
     expert = stage.start([sys.executable, os.path.join(HERE, script), json.dumps(spec), stage.expert_file])
@@ -234,14 +235,14 @@ def begin_expert(stage, script="expert.py", **more):
 
 
 def changes(stage):
-    """What the problem expert was told, by whom, and what it had in the end."""
+    """Returns the changes that the problem expert received, their senders, and its final state."""
     with open(stage.expert_file, encoding="utf-8") as file:
         lines = [json.loads(line) for line in file]
     return [(it["who"], it["told"]) for it in lines], [lines[-1]["facts"], lines[-1]["numbers"]]
 
 
 def serve(stage, crew, *options, meanwhile=None, expert=None):
-    """The program stands in for PlanSys2's planner and executor; what a client of theirs is told."""
+    """The program replaces PlanSys2's planner and executor; returns the answers to a client."""
     script = os.path.join(HERE, "performers.py")
     there = [stage.start([sys.executable, script, json.dumps(crew), stage.log_file])]
     program = [*stage.world.split(), "serve", "--elbowroom", ELBOWROOM]
@@ -307,7 +308,7 @@ def an_executed_plan_is_cancelled(stage):
 
 
 def a_run_dies_while_a_plan_is_executed(stage):
-    """What it has left running is told to stop, and the client hears of it."""
+    """Actions left running are cancelled, and the client is notified."""
     crew = {name: dict(spec, lasts=30) for name, spec in DRIVERS.items()}
 
     def kill(client):
@@ -342,7 +343,7 @@ AT_THE_GATE = [["at r1 gate", "at r2 gate", "signalled gate"], {"trips r1": 1.0,
 
 
 def what_is_done_is_told_to_the_problem_expert(stage):
-    """Each effect once, when it takes place; the client's result comes when all of them are there."""
+    """Each effect is reported once, when it happens; the client's result follows all of them."""
     said = serve(stage, DRIVERS, expert=begin_expert(stage))
     assert said["executed"]["outcome"] == "succeeded" and len(said["executed"]["actions"]) == 3
     told, known = changes(stage)
@@ -357,7 +358,7 @@ def what_is_done_is_told_to_the_problem_expert(stage):
 
 
 def what_others_tell_the_problem_expert_is_heeded(stage):
-    """The robot that has come to the gate is taken back to the barn, and goes to the gate again."""
+    """The robot at the gate is moved back to the barn, and drives to the gate again."""
     then = [{"when": "add at r2 gate", "then": ["remove at r2 gate", "add at r2 barn", "update trips r1 7"]}]
     said = serve(stage, DRIVERS, expert=begin_expert(stage, then=then))
     assert said["executed"]["outcome"] == "succeeded"
@@ -374,7 +375,7 @@ def what_others_tell_the_problem_expert_is_heeded(stage):
 def what_the_problem_expert_refuses_is_said_and_the_run_goes_on(stage):
     said = serve(stage, DRIVERS, expert=begin_expert(stage, refuses="at r1 gate"))
     assert said["executed"]["outcome"] == "succeeded" and len(said["executed"]["actions"]) == 3
-    assert "the problem expert does not take (at r1 gate): it is not valid" in stage.program
+    assert "the problem expert rejects (at r1 gate): it is not valid" in stage.program
     assert said["known"][0] == ["at r2 gate", "signalled gate"]
 
 
@@ -502,7 +503,7 @@ def main():
     plays = [it for it in plays if not only or it[0].__name__ in only]
     with ThreadPoolExecutor(AT_A_TIME) as pool:
         went_well = list(pool.map(lambda it: play(it[0], *it[1]), enumerate(plays)))
-    print(f"{sum(went_well)} of {len(went_well)} scenarios went as they should")
+    print(f"{sum(went_well)} of {len(went_well)} scenarios passed")
     sys.exit(0 if all(went_well) else 1)
 
 

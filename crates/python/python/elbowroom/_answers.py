@@ -357,7 +357,7 @@ class Envelope(Table):
             if room.name == name or room.quantity == name:
                 return room
         known = ", ".join(room.name for room in self.rows())
-        raise KeyError(f"no quantity is called {name!r}; there are: {known}")
+        raise KeyError(f"unknown quantity {name!r}; known are {known}")
 
     def __contains__(self, values: object) -> bool:
         """Whether values, by name, all lie in their intervals."""
@@ -463,11 +463,11 @@ class Run(Table):
         from ._numbers import document
 
         if self.trace_text is None:
-            raise ValueError("no trace was kept; run with trace=True")
+            raise ValueError("the run has no trace; run with trace=True")
         return [document(line) for line in self.trace_text.splitlines()]
 
     def rows(self) -> list[Execution]:
-        """What was done."""
+        """Executed actions."""
         return [
             Execution(*(it.get(field) for field in Execution._fields))
             for it in self.document["executed"]

@@ -172,8 +172,9 @@ class BackgroundRun:
     def _refuse_in_world(self, method: str) -> None:
         if self._is_in_world():
             raise RuntimeError(
-                f"{method}() waits for the world, so that it cannot be called in its thread or event loop; "
-                f"call request_stop(), or `await asyncio.to_thread(executive.{method}, …)`"
+                f"{method}() waits for the world and cannot be called in the world's thread or "
+                f"event loop; call request_stop(), or `await "
+                f"asyncio.to_thread(executive.{method}, …)`"
             )
 
     def _raise_ended(self) -> NoReturn:
@@ -190,7 +191,7 @@ def _loop(world: object) -> asyncio.AbstractEventLoop | None:
     try:
         return asyncio.get_running_loop()
     except RuntimeError:
-        raise TypeError("this world has coroutines; make the executive in a coroutine") from None
+        raise TypeError("this world has coroutines; create the executive in a coroutine") from None
 
 
 _running: weakref.WeakSet[BackgroundRun] = weakref.WeakSet()

@@ -112,7 +112,7 @@ class BugError(ElbowroomError, RuntimeError):
     def __init__(self, said: str) -> None:
         super().__init__(
             f"this is a bug in Elbowroom: {said}. Please report it, with the domain, the problem "
-            "and the call that led here; nothing that you gave should end like this"
+            "and the call that led here; no input should cause this error"
         )
 
 

@@ -137,7 +137,7 @@ class Executable:
         If the task is cancelled, the run ends in order. The :class:`asyncio.CancelledError` has it as ``run``.
         """
         if world is None or isinstance(world, (str, os.PathLike)):
-            raise TypeError("run_async needs a world in Python; `problem.run` executes in world files")
+            raise TypeError("run_async needs a world in Python; use `problem.run` for world files")
         request = RunRequest(
             self._native,
             None if plan is None else self._plan_text(plan),

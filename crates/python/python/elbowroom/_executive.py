@@ -145,7 +145,7 @@ class Executive(BackgroundRun):
         name = native.embedded_world()
         if name is not None and world is None:
             raise ExecutiveError(
-                f"the world of this run is an object in Python, `{name}`; give another one like it"
+                f"the world of this run is a Python object, `{name}`; pass such a world"
             )
         if name is None and world is not None:
             raise ExecutiveError("the world of this run is a process; leave out the world")
@@ -221,7 +221,7 @@ class Executive(BackgroundRun):
         """Cancels an open goal.
 
         Raises:
-            RequestError: if no goal of that name is open.
+            RequestError: if there is no open goal with this name.
         """
         self._check(self._native.cancel_goal(goal, self._patience()))
 
@@ -262,7 +262,7 @@ class Executive(BackgroundRun):
             succeeded = becomes == "done"
             self._check(self._native.report_action(number, succeeded, self._patience()))
         else:
-            raise RequestError(f"{becomes!r} is no outcome; say 'done', 'failed' or 'cancelled'")
+            raise RequestError(f"{becomes!r} is not an outcome; expected 'done', 'failed' or 'cancelled'")
 
     def _patience(self) -> float:
         # The run waits for the world, which must not wait for the run.
@@ -270,7 +270,7 @@ class Executive(BackgroundRun):
 
     def _check(self, state: str) -> None:
         if state == "journal-failed":
-            raise ExecutiveError("the journal cannot be written, so this is not kept; the executive ends")
+            raise ExecutiveError("the journal cannot be written; the request is lost, and the executive ends")
         if state == "run-ended":
             self._raise_ended()
 
@@ -340,7 +340,7 @@ class Executive(BackgroundRun):
             An iterator. Lines that are no longer kept are counted by an entry with the event ``missed`` and ``lines``.
         """
         if after is not None and after < 0:
-            raise ValueError(f"`after` is {after}; give a number of a line, or 0")
+            raise ValueError(f"`after` is {after}; expected a line number, or 0")
         sent = self._native.last_line(0, 0)[0] if after is None else after
         return self._entries(sent)
 
@@ -369,7 +369,7 @@ class Executive(BackgroundRun):
 
     def _unknown(self, name: str) -> RequestError:
         known = ", ".join(goal.name for goal in self.goals() if goal.is_open) or "none"
-        return RequestError(f"there is no goal of the name {name!r}; open goals: {known}")
+        return RequestError(f"unknown goal {name!r}; open goals: {known}")
 
 def _text(number: Number | None) -> str | None:
     return None if number is None else text(number)
@@ -378,5 +378,5 @@ def _text(number: Number | None) -> str | None:
 def _segments(size: int, kept: int) -> tuple[int, int]:
     for name, number in (("journal_size", size), ("journal_segments", kept)):
         if number < 0:
-            raise RequestError(f"`{name}` is {number}; give a number from 0 on")
+            raise RequestError(f"`{name}` is {number}; expected a number of at least 0")
     return size, kept

@@ -21,10 +21,10 @@ def exact(number: Number) -> Exact:
     (Fraction(1, 10), Fraction(1, 3), Fraction(2, 1), inf)
     """
     if isinstance(number, bool):
-        raise TypeError(f"{number} is no number; give an int, a Fraction, a str or a float")
+        raise TypeError(f"{number} is not a number; expected an int, a Fraction, a str or a float")
     if isinstance(number, float):
         if math.isnan(number):
-            raise ValueError("nan is no number")
+            raise ValueError("expected a number, found nan")
         return number if math.isinf(number) else Fraction(repr(number))
     if isinstance(number, str):
         text = number.strip().lower()

@@ -99,7 +99,7 @@ def falling(odds: Odds, ax: Axes | None) -> Axes:
     ax.barh(lanes, [100 * share for share in shares], 0.6, color=_BAR)
     ax.set_xlim(0, 100)
     labels = [*(it.what for it in happenings), "the goal"]
-    return _lanes(ax, labels, "everything has gone well so far, %")
+    return _lanes(ax, labels, "no failure so far, %")
 
 
 def rates(comparison: Comparison, ax: Axes | None) -> Axes:

@@ -232,7 +232,7 @@ class Problem(Executable):
         found = document(answer)
         if written is None or dot is None:
             raise RequestError(
-                f"the plan does not work, so it has no room: {found['violation']['message']}"
+                f"the plan does not work, so it has no envelope: {found['violation']['message']}"
             )
         return Stn(found, written, dot)
 

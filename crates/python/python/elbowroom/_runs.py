@@ -38,9 +38,9 @@ def run_options(
     chosen: dict[str, Any] = {"executor": executor, "seed": seed}
     chosen["planner"] = planner if isinstance(planner, str) else "embedded"
     if not isinstance(planner, str) and options.get("jobs") is not None:
-        raise RequestError("`jobs` says how many threads the embedded planner uses")
+        raise RequestError("`jobs` is the number of threads of the embedded planner")
     if not isinstance(planner, str) and options.get("self_overlap"):
-        raise RequestError("`self_overlap` is about plans of the embedded planner")
+        raise RequestError("`self_overlap` applies only to the embedded planner")
     for name, value in options.items():
         if name in _TEXTS and value is not None and value != "measured":
             value = text(value)
@@ -97,7 +97,7 @@ def concluded(
     if raised is not None:
         raise WorldError(f"{type(raised).__name__}: {raised}", run) from raised
     if run.verdict == "world-failed":
-        raise WorldError(f"the world broke its contract: {run.why}", run)
+        raise WorldError(f"the world violated its contract: {run.why}", run)
     if lifecycle is None or not (lifecycle.is_ended_early and lifecycle.running):
         return []
     running = ", ".join(lifecycle.running)
@@ -263,5 +263,5 @@ class RunRequest:
         elif self._handle is not None and self._handle.is_requested:
             is_interrupted = False
         if is_interrupted:
-            said.insert(0, "ended by Ctrl-C; this is the best answer until then")
+            said.insert(0, "interrupted by Ctrl-C; this is the best answer so far")
         return run, "; ".join(said) or None

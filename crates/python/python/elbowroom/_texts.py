@@ -74,7 +74,7 @@ def seconds(limit: float | None) -> float | None:
         return None
     given = float(limit)
     if not given >= 0:
-        raise ValueError(f"a time limit of {limit} seconds; give a number from 0 on")
+        raise ValueError(f"the time limit is {limit} seconds; expected a number of at least 0")
     return given
 
 
@@ -84,4 +84,4 @@ def warn(is_interrupted: bool, has_result: bool) -> None:
         return
     if not has_result:
         raise KeyboardInterrupt
-    warnings.warn("ended by Ctrl-C; this is the best answer until then", InterruptedWarning, 3)
+    warnings.warn("interrupted by Ctrl-C; this is the best answer so far", InterruptedWarning, 3)

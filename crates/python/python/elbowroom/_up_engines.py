@@ -118,7 +118,7 @@ class ElbowroomPlanner(
         OneshotPlannerMixin.__init__(self)
         AnytimePlannerMixin.__init__(self)
         if plan not in ("time-triggered", "stn"):
-            raise UPUsageError(f"there are no plans of kind {plan!r}; there are time-triggered and stn")
+            raise UPUsageError(f"unknown kind of plans {plan!r}; expected time-triggered or stn")
         self._plan_kind = plan
         self._last: Any = None
         _whole("seed", seed, None)
@@ -162,7 +162,7 @@ class ElbowroomPlanner(
         output_stream: IO[str] | None = None,
     ) -> PlanGenerationResult:
         if heuristic is not None:
-            warnings.warn("elbowroom has its own heuristic; the one given is not used", stacklevel=3)
+            warnings.warn("elbowroom uses its own heuristic; the given one is ignored", stacklevel=3)
         # Without a limit the first plan is enough; with one, the search uses all of it.
         timeout = self._limit(timeout)
         return self._result(problem, timeout, first=timeout is None)
@@ -235,8 +235,9 @@ class ElbowroomPlanner(
         steps = apart(translated, [_on_time(translated, step) for step in found.steps])
         if steps is None:
             text = (
-                "no plan found: the one that was found has steps that write the same fact at one time, "
-                "which unified-planning does not allow, and they cannot be moved apart"
+                "no plan found: the plan that was found has steps that write the same fact at "
+                "the same time, which unified-planning does not allow, and they cannot be "
+                "separated"
             )
             message = LogMessage(LogLevel.INFO, text)
             return PlanGenerationResult(
@@ -261,8 +262,8 @@ class ElbowroomPlanner(
         elif found.is_proved:
             outcome = status.UNSOLVABLE_INCOMPLETELY
             reason = (
-                "no plan found: none exists with interfering actions at least 0.001 apart, but the problem "
-                "has no epsilon, so that one with shorter times between may exist"
+                "no plan found: none exists with interfering actions at least 0.001 apart, but "
+                "the problem has no epsilon, so a plan with smaller separations may exist"
             )
         message = LogMessage(LogLevel.INFO, reason)
         return PlanGenerationResult(outcome, None, self.name, log_messages=[message])
@@ -306,7 +307,7 @@ class ElbowroomPlanner(
     def _remove_goal(self, goal: Any) -> None:
         (goal,) = self._problem.environment.expression_manager.auto_promote(goal)
         goals = self._problem.goals
-        self._complain_unless(goal in goals, f"the goal {goal} is none of {goals}")
+        self._complain_unless(goal in goals, f"unknown goal {goal}; expected one of {goals}")
         self._problem.clear_goals()
         for other in goals:
             if other != goal:
@@ -318,7 +319,7 @@ class ElbowroomPlanner(
     def _remove_action(self, name: str) -> None:
         actions = self._problem.actions
         names = [action.name for action in actions]
-        self._complain_unless(name in names, f"the action {name} is none of {names}")
+        self._complain_unless(name in names, f"unknown action {name}; expected one of {names}")
         self._problem.clear_actions()
         for action in actions:
             if action.name != name:

@@ -42,7 +42,7 @@ class Translation:
     def __init__(self, problem: UPProblem) -> None:
         if not isinstance(problem, UPProblem):
             raise UnsupportedError(
-                f"a {type(problem).__name__} is no action-based problem; only these are supported"
+                f"a {type(problem).__name__} is not an action-based problem; only these are supported"
             )
         self.original = problem
         self._say = Expressions(problem, [COST])
@@ -87,7 +87,7 @@ class Translation:
     def _refuse_what_has_no_counterpart(self) -> None:
         problem = self.original
         if problem.kind.has_discrete_time():
-            raise UnsupportedError("discrete time is not supported: plans have times of any fraction")
+            raise UnsupportedError("discrete time is not supported: times of plans are arbitrary fractions")
         if problem.timed_goals:
             raise UnsupportedError("timed goals are not supported")
         if problem.trajectory_constraints or getattr(problem, "state_invariants", None):
@@ -329,13 +329,13 @@ def _split(text: str) -> Iterator[str]:
 def _point(timing: Timing, action: Any) -> str:
     if timing.delay != 0:
         raise UnsupportedError(
-            f"{action.name} has something at {timing}; only its start and its end are supported"
+            f"{action.name} has a condition or effect at {timing}; only its start and its end are supported"
         )
     if timing.is_from_start() and not timing.is_global():
         return "start"
     if timing.is_from_end() and not timing.is_global():
         return "end"
-    raise UnsupportedError(f"{action.name} refers to {timing}, which is not its own time")
+    raise UnsupportedError(f"{action.name} refers to {timing}, which is not its own start or end")
 
 
 def _when_of(timing: Timing, action: Any) -> str:

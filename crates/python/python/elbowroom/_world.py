@@ -178,7 +178,7 @@ def passage(
         now, observations = answer
     except (TypeError, ValueError):
         raise TypeError(
-            f"{method}() must return what time it is and a list of observations, not {answer!r}"
+            f"{method}() must return the time and a list of observations, not {answer!r}"
         ) from None
     return {"now": text(now), "observations": wire(observations)}
 

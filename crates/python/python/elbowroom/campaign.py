@@ -215,10 +215,10 @@ def compare(
     """
     read = experiment if isinstance(experiment, Experiment) else Experiment(experiment)
     if engine not in ("local", "ray", "slurm"):
-        raise ValueError(f"there is no engine {engine!r}; there are local, ray and slurm")
+        raise ValueError(f"unknown engine {engine!r}; expected local, ray or slurm")
     count = shards if shards is not None else (1 if engine == "local" else 8)
     if count < 1:
-        raise ValueError(f"{count} parts; there must be at least one")
+        raise ValueError(f"{count} parts; expected at least one")
     keep = None if folder is None else Path(folder)
     parts = _Parts(read, trials, count, keep)
     if engine == "local":
@@ -259,7 +259,7 @@ class _Parts:
             if damage is None:
                 self.made[shard] = self._checked(path)
             else:
-                warnings.warn(f"{path} is damaged ({damage}); it is made again", DamagedWarning, 4)
+                warnings.warn(f"{path} is damaged ({damage}); it is computed again", DamagedWarning, 4)
 
     def _checked(self, path: Path) -> str:
         text = path.read_bytes().decode("utf-8")
@@ -267,10 +267,10 @@ class _Parts:
         try:
             self.experiment.merge([text])
             if json.loads(text)["trials"] != wanted:
-                raise CampaignError(f"it is of {json.loads(text)['trials']} trials, not {wanted}")
+                raise CampaignError(f"it has {json.loads(text)['trials']} trials, not {wanted}")
         except Exception as error:
             raise CampaignError(
-                f"{path} is no part of this experiment ({error}); name another folder, or remove it"
+                f"{path} is not a part of this experiment ({error}); use another folder, or remove the file"
             ) from error
         return text
 
@@ -295,8 +295,8 @@ class _Parts:
                 + (f" ({reasons[shard]})" if shard in reasons else "")
                 for shard in missing
             )
-            kept = f"; the others are in {self.folder}" if self.folder is not None else ""
-            raise CampaignError(f"missing: {named}{kept}; call again to make only these")
+            kept = f"; the other parts are in {self.folder}" if self.folder is not None else ""
+            raise CampaignError(f"missing: {named}{kept}; call again to compute only these")
         parts = [self.made[shard] for shard in range(self.shards)]
         results = parts[0] if self.shards == 1 else self.experiment.merge(parts)
         return Comparison(self.experiment, results)
@@ -314,12 +314,12 @@ def _damage(path: Path) -> str | None:
         if beside.read_text(encoding="utf-8", errors="replace").split()[:1] != [
             hashlib.sha256(found).hexdigest()
         ]:
-            return f"its bytes are not those of {beside.name}"
+            return f"its content differs from {beside.name}"
         return None
     try:
         json.loads(found)
     except ValueError:
-        return "it is no JSON document"
+        return "it is not a JSON document"
     return None
 
 
@@ -336,7 +336,7 @@ def _local(parts: _Parts, jobs: int, progress: ProgressCallback | bool | None) -
             parts.trials, (shard, parts.shards), jobs, progress
         )
         if is_interrupted:
-            warnings.warn("ended by Ctrl-C; these are the trials until then", InterruptedWarning, 3)
+            warnings.warn("interrupted by Ctrl-C; these are the trials so far", InterruptedWarning, 3)
             whole = [*parts.made.values(), made]
             merged = made if len(whole) == 1 else parts.experiment.merge(whole)
             return Comparison(parts.experiment, merged)
@@ -392,7 +392,7 @@ SCRIPT = """\
 #SBATCH --cpus-per-task={jobs}
 #SBATCH --requeue
 #SBATCH --output={folder}/part-%a.log
-# One part each; parts that are done are not made again.
+# One part each; existing parts are not computed again.
 exec {python} -m elbowroom._job {folder} "$SLURM_ARRAY_TASK_ID" {shards} {jobs} {trials}
 """
 """The job script, which is written to ``job.sh`` in the folder."""
@@ -406,7 +406,7 @@ def _slurm(
     progress: ProgressCallback | bool | None,
 ) -> Comparison:
     if parts.folder is None:
-        raise ValueError('engine="slurm" needs a folder that all nodes share: folder="…"')
+        raise ValueError('engine="slurm" needs a folder shared by all nodes: folder="…"')
     missing = parts.missing()
     if not missing:
         return parts.merged()
@@ -428,19 +428,19 @@ def _slurm(
         done = subprocess.run(command, capture_output=True, text=True, check=False)
     except FileNotFoundError as error:
         raise CampaignError(
-            f"there is no sbatch here; on a machine of the cluster, `sbatch {folder}/job.sh` "
-            "makes the missing parts"
+            f"sbatch was not found; on a machine of the cluster, `sbatch {folder}/job.sh` "
+            "computes the missing parts"
         ) from error
     parts.collect()
     tell = listener(progress)
     if tell is not None:
         tell(*Progress("parts", len(parts.made), parts.shards, done.stdout.strip()))
     if done.returncode != 0 and parts.missing() and not done.stdout.strip():
-        raise CampaignError(f"sbatch refused the job: {done.stderr.strip()}")
+        raise CampaignError(f"sbatch rejected the job: {done.stderr.strip()}")
     if not wait and parts.missing():
         raise CampaignError(
-            f"{done.stdout.strip()}: {len(parts.missing())} of {parts.shards} parts are to come; "
-            "call again, when the jobs are done, to collect them"
+            f"{done.stdout.strip()}: {len(parts.missing())} of {parts.shards} parts are "
+            "pending; call again after the jobs to collect them"
         )
     return parts.merged({shard: f"see {folder}/part-{shard}.log" for shard in parts.missing()})
 

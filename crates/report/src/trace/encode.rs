@@ -502,7 +502,7 @@ fn warning(action: &str, left: &Rational, cause: WarningCause) -> String {
     let left = left.to_decimal(3);
     match cause {
         WarningCause::Slack => {
-            format!("{action} has used its room: {left} s until a new plan is needed")
+            format!("{action} has used its slack: {left} s until a new plan is needed")
         }
         WarningCause::Timeout => {
             format!("no progress of {action}: it times out in {left} s and is cancelled then")

@@ -44,7 +44,7 @@ pub struct Stored {
 }
 
 /// The error for another kind of file.
-const NO_TRACE: &str = "this is no trace of a run, as `--trace` writes it";
+const NO_TRACE: &str = "this is not the trace of a run, as `--trace` writes it";
 
 impl Stored {
     /// Reads a trace.
@@ -70,7 +70,7 @@ impl Stored {
             return Err(wrong(0, format!("this program reads version {VERSION}")));
         }
         let Value::Object(mut header) = header else {
-            return Err(wrong(0, "this is no trace of a run".to_owned()));
+            return Err(wrong(0, "this is not the trace of a run".to_owned()));
         };
         for own in ["event", "format", "version"] {
             header.shift_remove(own);
@@ -98,7 +98,7 @@ impl Stored {
                 Err(error) if error.is_eof() && index + 1 == rest.len() => is_cut_off = true,
                 Err(error) => {
                     let what = if error.is_data() {
-                        "this is no line of a trace"
+                        "this is not a line of a trace"
                     } else {
                         "this is not JSON"
                     };
@@ -457,7 +457,7 @@ pub(super) fn instantiate(
     let mut words = name.trim_matches(['(', ')']).split_whitespace();
     let problem = task.problem();
     let schema = words.next().and_then(|word| problem.schema(word));
-    let schema = schema.ok_or_else(|| format!("there is no action `{name}`"))?;
+    let schema = schema.ok_or_else(|| format!("unknown action `{name}`"))?;
     let objects: Option<Vec<_>> = words.map(|word| problem.object(word)).collect();
     let objects = objects.ok_or_else(|| format!("`{name}` has an unknown object"))?;
     task.instantiate(schema, &objects)

@@ -261,15 +261,20 @@ impl SnapshotLine {
                 is_unsolvable: self.unsolvable,
             },
             (None, None) => {
-                return Err("it says neither a plan nor since when there is none".to_owned());
+                return Err(
+                    "it has neither a plan nor the time since which there is none".to_owned(),
+                );
             }
         };
         let action = |ticket: ActionHandle| starts::action_of(&starts, ticket).cloned();
         for (ticket, running) in &parts.running {
             let action = action(*ticket)
-                .ok_or_else(|| format!("{ticket} is running, and was not started"))?;
+                .ok_or_else(|| format!("{ticket} is running, but was not started"))?;
             if !running.guards.fit(&action) {
-                return Err(format!("{ticket} has other effects than {}", action.name));
+                return Err(format!(
+                    "the effects of {ticket} differ from {}",
+                    action.name
+                ));
             }
         }
         let refused = self.refused.iter();

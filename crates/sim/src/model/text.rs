@@ -177,18 +177,23 @@ impl Reader<'_> {
         let Some((span, distribution, minimum, maximum)) = found.pop() else {
             return Err(self.error_at(
                 &section.span(),
-                "say how it is distributed: constant, normal, lognormal, uniform, triangular or values",
+                "expected a distribution: constant, normal, lognormal, uniform, triangular or \
+                 values",
             ));
         };
         if !found.is_empty() {
-            return Err(self.error_at(&span, "one distribution is enough"));
+            return Err(self.error_at(&span, "expected only one distribution"));
         }
         if let Some(problem) = distribution.problem() {
             return Err(self.error_at(&span, problem));
         }
         for (span, limit) in minimum.iter().chain(&maximum) {
             if !limit.is_finite() {
-                return Err(self.error_at(span, "a limit must be finite; leave it out for none"));
+                return Err(self.error_at(
+                    span,
+                    "a limit must be finite; leave it out if there is \
+                                                none",
+                ));
             }
         }
         if let (Some((_, minimum)), Some((span, maximum))) = (&minimum, &maximum)
@@ -210,7 +215,7 @@ impl Reader<'_> {
         match (inside, beside) {
             (Some((span, _)), Some(_)) => Err(self.error_at(
                 &span,
-                "write this limit once: inside the braces, or beside them",
+                "write this limit only once: inside or outside the braces",
             )),
             (inside, beside) => Ok(inside.or_else(|| beside.clone())),
         }
@@ -357,7 +362,7 @@ impl Reader<'_> {
                     .get_ref()
                     .distribution_span()
                     .unwrap_or_else(|| section.span()),
-                "`late` is missing: how likely it is that a report comes so late",
+                "`late` is missing: the probability of such a late report",
             ));
         }
         Ok(ReportReliability {

@@ -352,7 +352,7 @@ impl ProtocolDriver {
     }
 
     fn report_unparsable(&mut self, line: &str, why: &str) {
-        let check = if why.contains("was never given") {
+        let check = if why.contains("unknown ticket") {
             Check::KnowsTickets
         } else if why.contains("answers question") {
             Check::Answers

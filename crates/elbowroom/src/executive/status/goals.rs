@@ -26,7 +26,7 @@ const FAILED: &str = "failed";
 const NOT_RELEASED: &str = "its release time is in the future";
 
 /// Reason for the state of a queued goal to keep.
-const OTHERS_FIRST: &str = "it does not hold; other goals are pursued first";
+const OTHERS_FIRST: &str = "it does not hold, but other goals are pursued first";
 
 /// The open goals, and the most recently closed ones.
 #[derive(Clone, Debug, Default)]

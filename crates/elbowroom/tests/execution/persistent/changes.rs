@@ -106,9 +106,9 @@ fn invalid_request_is_ignored_with_a_remark() {
     assert_has(
         &told,
         &[
-            "1: it is no goal of this problem",
-            "2: no goal of that name is open",
-            "3: it is not paused",
+            "1: it is not a valid goal of this problem",
+            "2: there is no open goal with this name",
+            "3: the run is not paused",
             "rest: goal-reached problem",
         ],
     );

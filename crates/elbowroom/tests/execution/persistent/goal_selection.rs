@@ -192,8 +192,8 @@ fn lateness_of_a_single_goal_is_stated_with_its_certificate() {
     assert_has(
         &told,
         &[
-            "rest: unsolvable-from-here ward: `ward` would be 5.001 s late: it cannot be reached before 10.001",
-            "5: `ward` failed, because its deadline has passed; it would have been 5.001 s late: it cannot be reached before 10.001",
+            "rest: unsolvable-from-here ward: `ward` would be reached 5.001 s late: it cannot be reached before 10.001",
+            "5: `ward` failed, because its deadline has passed; it would have been reached 5.001 s late: it cannot be reached before 10.001",
         ],
     );
 }
@@ -210,7 +210,7 @@ fn lateness_without_certificate_is_that_of_the_earliest_plan_found() {
     assert_has(
         &told,
         &[
-            "25: `all` failed, because its deadline has passed; it would have been 5.003 s late: the earliest plan found reaches it at 30.003",
+            "25: `all` failed, because its deadline has passed; it would have been reached 5.003 s late: the earliest plan found reaches it at 30.003",
         ],
     );
     assert!(!has(&told, "cannot be reached"), "{:#?}", told.notes);

@@ -23,7 +23,7 @@ fn goal_to_keep_is_achieved_again_whenever_it_does_not_hold() {
             "30: rest: goal-reached cup",
             "30: `cup` kept",
             "50: `cup` pursued again",
-            "50: plan, because the goals have changed: `cup` to be kept does not hold",
+            "50: plan, because the goals have changed: `cup` does not hold and is to be kept",
             "50: start (fetch r cup)",
             "60: `cup` kept",
         ],
@@ -57,7 +57,7 @@ fn other_goals_are_pursued_before_goals_to_keep() {
     assert_has(
         &told,
         &[
-            "20: `cup` queued, because it does not hold; other goals are pursued first",
+            "20: `cup` queued, because it does not hold, but other goals are pursued first",
             "20: start (fetch r key)",
             "30: `cup` pursued again",
             "30: start (fetch r cup)",
@@ -188,7 +188,7 @@ fn goal_to_keep_has_a_release_time_and_no_deadline() {
     assert_has(
         &told,
         &[
-            "20: a goal to keep has no deadline",
+            "20: a goal to keep cannot have a deadline",
             "60: `cup` pursued again",
             "70: `cup` kept",
         ],

@@ -76,7 +76,7 @@ fn queued_goal_is_abandoned_or_replaced_without_a_plan() {
     assert_has(
         &told,
         &[
-            "24: no goal of that name is open",
+            "24: there is no open goal with this name",
             "60: `key` released",
             "60: start (fetch",
         ],

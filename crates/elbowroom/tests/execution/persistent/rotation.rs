@@ -336,7 +336,7 @@ fn mismatched_snapshot_is_rejected() {
     };
     let busy = snapshots.find(is_busy).expect("there is one");
     for (from, to, why) in [
-        ("(fetch ", "(carry ", "there is no action `(carry "),
+        ("(fetch ", "(carry ", "unknown action `(carry "),
         (
             "\"outcome\":\"succeeded\"",
             "\"outcome\":\"so-so\"",

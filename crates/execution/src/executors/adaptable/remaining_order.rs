@@ -246,7 +246,7 @@ impl RemainingOrder {
         *latest = time;
         let (times, since) = (*times, latest.clone());
         let name = &self.steps[instance.index()].action.name;
-        let about = format!("{name} has succeeded {times} times at one time and does not lead on");
+        let about = format!("{name} has succeeded {times} times at the same time without progress");
         let reason = Reason::new(Cause::NoOrder).about(Subject::ExternalMessage(about));
         (times > MAX_SUCCESSES_PER_TIME).then(|| reason.since(self.to_world_time(&since)))
     }
@@ -431,7 +431,7 @@ impl RemainingOrder {
     fn cycle_reason(&self, instance: InstanceId, count: u32, now: &Rational) -> Reason {
         let name = &self.steps[instance.index()].action.name;
         let about =
-            format!("{name} has succeeded {count} times in the same state and does not lead on");
+            format!("{name} has succeeded {count} times in the same state without progress");
         let reason = Reason::new(Cause::NoOrder).about(Subject::ExternalMessage(about));
         reason.since(now.clone())
     }

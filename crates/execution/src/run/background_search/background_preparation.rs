@@ -110,7 +110,7 @@ impl Run<'_> {
                 readying.since = Some(self.now.clone());
                 None
             }
-            _ => Some("no plan was being made ready"),
+            _ => Some("no plan was being prepared"),
         }
     }
 

@@ -73,21 +73,21 @@ impl File {
     pub(super) fn check_size(&self) -> Result<(), (Span, String)> {
         let wrong = |span: Span, message: &str| Err((span, message.to_owned()));
         if *self.trials.get_ref() == 0 {
-            return wrong(self.trials.span(), "make at least one trial");
+            return wrong(self.trials.span(), "expected at least one trial");
         }
         if self.executors.get_ref().is_empty() {
-            return wrong(self.executors.span(), "name at least one executor");
+            return wrong(self.executors.span(), "expected at least one executor");
         }
         if self.column.is_empty() {
-            return wrong(self.format.span(), "write at least one [[column]]");
+            return wrong(self.format.span(), "expected at least one [[column]]");
         }
         let blanks = self.blanks.values();
         if let Some(empty) = blanks.into_iter().find(|it| it.get_ref().is_empty()) {
-            return wrong(empty.span(), "give the blank at least one value");
+            return wrong(empty.span(), "expected at least one value for the blank");
         }
         let mut groups = self.together.iter().map(|group| &group.rows);
         if let Some(empty) = groups.find(|rows| rows.get_ref().is_empty()) {
-            return wrong(empty.span(), "give the blanks at least one row");
+            return wrong(empty.span(), "expected at least one row for the blanks");
         }
         Ok(())
     }
@@ -101,7 +101,7 @@ impl File {
             if let Some(row) = rows.find(|row| row.get_ref().len() != width) {
                 return Err((
                     row.span(),
-                    format!("write {width} values, one for each name"),
+                    format!("expected {width} values, one for each name"),
                 ));
             }
             let rows = group.rows.get_ref().iter();
@@ -123,7 +123,7 @@ impl File {
             .as_ref()
             .is_none_or(|name| name.get_ref() == EMBEDDED);
         if let (Some(_), Some(first_plan)) = (&self.plan, &self.first_plan) {
-            let message = "the experiment names its plan: leave out `plan`, or `first_plan`";
+            let message = "`plan` and `first_plan` exclude each other: leave out one of them";
             return Err((first_plan.span(), message.to_owned()));
         }
         let Some(given) = &self.first_plan else {
@@ -137,7 +137,7 @@ impl File {
             return Ok(*given.get_ref());
         }
         let message =
-            "another planner gives only its own plan: leave out `planner`, or `first_plan`";
+            "`first_plan` needs the embedded planner: leave out `planner`, or `first_plan`";
         Err((given.span(), message.to_owned()))
     }
 
@@ -149,14 +149,14 @@ impl File {
             if !rows.contains(&figures.executor) {
                 let name = &figures.executor;
                 let rows = rows.join(", ");
-                return wrong(format!("`{name}` is no row of the table; it has {rows}"));
+                return wrong(format!("unknown row `{name}`; the table has {rows}"));
             }
             let count = figures.replans.len();
             if figures.coverage.len() != self.column.len()
                 || (count != 0 && count != self.column.len())
             {
                 return wrong(format!(
-                    "write one figure for each of the {} columns, nan where there is none",
+                    "expected one figure for each of the {} columns, or nan",
                     self.column.len()
                 ));
             }
@@ -185,8 +185,8 @@ impl File {
                 None => Ok(Planning::Embedded),
                 Some(time) => Err((
                     time.span(),
-                    "`planner_time` is for another planner: name it with `planner`, or limit the \
-                     embedded one with `planning_budget`"
+                    "`planner_time` needs an external planner: name one with `planner`, or limit \
+                     the embedded planner with `planning_budget`"
                         .to_owned(),
                 )),
             },
@@ -209,7 +209,7 @@ impl File {
             settings.planning_time = PlanningTime::Seconds(number.ok_or_else(|| {
                 (
                     time.span(),
-                    "write a number of seconds, so that results can be repeated".to_owned(),
+                    "expected a number of seconds, so that results can be reproduced".to_owned(),
                 )
             })?);
         } else {

@@ -96,7 +96,7 @@ impl Bars {
         }
         let why = start.why.as_deref().unwrap_or_default();
         let words = match (outcome, why) {
-            ("ordered", _) => format!("ordered at {}, nothing heard", nearest(&start.ordered)),
+            ("ordered", _) => format!("requested at {}, not confirmed", nearest(&start.ordered)),
             (outcome, "") => outcome.to_owned(),
             (outcome, why) => format!("{outcome}: {why}"),
         };
@@ -171,9 +171,9 @@ impl Bars {
         let has_plan = !self.steps.is_empty();
         Table {
             heading: if has_plan {
-                "Planned and done"
+                "Planned and actual times"
             } else {
-                "What was done"
+                "Executed actions"
             }
             .to_owned(),
             columns: columns

@@ -52,7 +52,12 @@ pub(super) fn plan(
         patience,
     )?;
     match said.status.code() {
-        Some(0) => steps_of(&said.out).ok_or_else(|| format!("{elbowroom} has not printed a plan")),
+        Some(0) => steps_of(&said.out).ok_or_else(|| {
+            format!(
+                "the output of {elbowroom} contains \
+                                                              no plan"
+            )
+        }),
         Some(1) => Err("no plan reaches the goal".to_owned()),
         _ => Err(format!(
             "the planner found no plan ({}): {}",
@@ -113,7 +118,7 @@ pub(super) fn sub_goals(
     let said = ask_in(&folder, elbowroom, &line, patience)?;
     match said.status.code() {
         Some(0) => ordered(&said.out)
-            .ok_or_else(|| format!("{elbowroom} has not said when goals are reached")),
+            .ok_or_else(|| format!("the output of {elbowroom} contains no times of the goals")),
         Some(1) => Err("the plan does not reach its goal".to_owned()),
         _ => Err(said.errors.trim().to_owned()),
     }
@@ -178,9 +183,10 @@ fn ask_in(
         .stderr(create(&errors)?)
         .spawn()
         .map_err(|e| not_started(elbowroom, &e))?;
-    let ended = wait(&mut child, patience).map_err(|e| format!("{elbowroom} was lost: {e}"))?;
-    let status =
-        ended.ok_or_else(|| format!("it took longer than {} s", patience.within.as_secs_f64()))?;
+    let ended =
+        wait(&mut child, patience).map_err(|e| format!("cannot wait for {elbowroom}: {e}"))?;
+    let status = ended
+        .ok_or_else(|| format!("time limit of {} s exceeded", patience.within.as_secs_f64()))?;
     let read = |path: &Path| fs::read_to_string(path).unwrap_or_default();
     Ok(CommandOutput {
         status,
@@ -258,7 +264,7 @@ impl Running {
         let socket = folder.path().join("world");
         let listener = UnixListener::bind(&socket).map_err(|e| unusable(&socket, &e))?;
         let own = std::env::current_exe()
-            .map_err(|e| format!("this program does not know where it is: {e}"))?;
+            .map_err(|e| format!("cannot find the path of this program: {e}"))?;
         // The world is started in that folder, so that only this program's own path could contain
         // blanks.
         let relay = folder.path().join("relay");
@@ -330,7 +336,7 @@ fn listen(listener: &UnixListener, inputs: &Sender<Input>) {
 /// # Errors
 /// That program has ended.
 pub(super) fn relay(socket: &Path) -> Result<(), String> {
-    let failed = |e: io::Error| format!("the program that executes is gone: {e}");
+    let failed = |e: io::Error| format!("lost the connection to the executing program: {e}");
     let mut stream = UnixStream::connect(socket).map_err(failed)?;
     let answers = stream.try_clone().map_err(failed)?;
     thread::spawn(move || {
@@ -353,7 +359,7 @@ pub(super) fn relay(socket: &Path) -> Result<(), String> {
 
 fn folder_with(texts: &PlanRequest) -> Result<TempDir, String> {
     let folder =
-        tempfile::tempdir().map_err(|e| format!("no folder for files can be made: {e}"))?;
+        tempfile::tempdir().map_err(|e| format!("cannot create a temporary folder: {e}"))?;
     for (name, text) in [
         ("domain.pddl", &texts.domain),
         ("problem.pddl", &texts.problem),
@@ -365,11 +371,11 @@ fn folder_with(texts: &PlanRequest) -> Result<TempDir, String> {
 }
 
 fn unusable(path: &Path, error: &io::Error) -> String {
-    format!("{} cannot be used: {error}", path.display())
+    format!("cannot use {}: {error}", path.display())
 }
 
 fn not_started(elbowroom: &str, error: &io::Error) -> String {
-    format!("{elbowroom} cannot be started: {error}; --elbowroom says where it is")
+    format!("cannot start {elbowroom}: {error}; give its path with --elbowroom")
 }
 
 #[cfg(test)]

@@ -100,7 +100,7 @@ fn serve(options: Options, serving: ServeOptions) -> Result<(), String> {
     let ended = ctrlc::set_handler(move || {
         let _ = ends.send(Input::Stop);
     });
-    ended.map_err(|e| format!("cannot listen to signals: {e}"))?;
+    ended.map_err(|e| format!("cannot receive signals: {e}"))?;
     let sides = serve::Connections {
         topics,
         services,

@@ -75,7 +75,8 @@ impl Network {
         let failed = |e: rustdds::dds::CreateError| {
             let domain = settings.domain_id;
             format!(
-                "cannot join the DDS domain {domain}: {e}; is a network interface up, with multicast?"
+                "cannot join the DDS domain {domain}: {e}; check that a network interface with \
+                 multicast is up"
             )
         };
         let participant = builder.build().map_err(failed)?;
@@ -221,7 +222,7 @@ impl Network {
         let requests = self.topic("rq", &request, &format!("{kind}_Request_"), &qos)?;
         let writer = self.publisher.create_datawriter_no_key_cdr(&requests, None);
         let writer: DataWriterCdr<Framed<Request>> =
-            writer.map_err(|e| format!("cannot ask {name}: {e}"))?;
+            writer.map_err(|e| format!("cannot call {name}: {e}"))?;
         let own = u128::from_le_bytes(writer.guid().to_bytes());
         let half = |it: u128| u64::try_from(it & u128::from(u64::MAX)).unwrap_or_default();
         Ok(ServiceClient {
@@ -418,11 +419,11 @@ where
                         Ok((header, message)) => {
                             (self.input)(RequestId { identity, header }, message)
                         }
-                        Err(why) => Input::Warning(format!("a message was not understood: {why}")),
+                        Err(why) => Input::Warning(format!("cannot parse a message: {why}")),
                     }
                 }
                 Ok(None) => return true,
-                Err(error) => Input::Warning(format!("a message was not understood: {error}")),
+                Err(error) => Input::Warning(format!("cannot parse a message: {error}")),
             };
             if inputs.send(input).is_err() {
                 return false;

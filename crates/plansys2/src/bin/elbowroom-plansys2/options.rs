@@ -8,10 +8,12 @@ use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-const ABOUT: &str = "\
-A world for `elbowroom run … --world-process elbowroom-plansys2`: the action performers of PlanSys2, over DDS and without ROS.
+const ABOUT: &str = "A world for `elbowroom run … --world-process elbowroom-plansys2`: the action \
+                     performers of PlanSys2, over DDS and without ROS.
 
-PlanSys2's own executor must be off: two of them would both choose performers. docs/plansys2.md says what happens when.";
+PlanSys2's own executor \
+                     must be off: otherwise both executors would choose performers. \
+                     docs/plansys2.md describes the sequence.";
 
 /// Command line of the program.
 #[derive(Debug, Parser)]
@@ -81,7 +83,7 @@ impl ServeOptions {
         // searched in PATH.
         let elbowroom = if self.elbowroom.contains('/') {
             let full = std::path::absolute(&self.elbowroom);
-            full.map_err(|e| format!("{} cannot be used: {e}", self.elbowroom))?
+            full.map_err(|e| format!("cannot use {}: {e}", self.elbowroom))?
                 .display()
                 .to_string()
         } else {
@@ -97,7 +99,7 @@ impl ServeOptions {
 
 fn seconds(number: f64) -> Result<Duration, String> {
     Duration::try_from_secs_f64(number)
-        .map_err(|_| format!("{number} s is no time to wait; give a number from 0"))
+        .map_err(|_| format!("expected a waiting time of at least 0 s, found {number} s"))
 }
 
 /// Options of the connection to the robots.
@@ -188,7 +190,12 @@ fn or_variable<T: FromStr>(given: Option<T>, variable: &str, default: T) -> Resu
         (Some(given), _) => Ok(given),
         (None, Ok(text)) if !text.is_empty() => {
             let read = text.trim().parse();
-            read.map_err(|_| format!("{variable} is {text:?} in the environment, which cannot be used; change or unset it"))
+            read.map_err(|_| {
+                format!(
+                    "the environment variable {variable} has the invalid value \
+                                      {text:?}; change or unset it"
+                )
+            })
         }
         _ => Ok(default),
     }
@@ -209,7 +216,7 @@ fn namespace(text: &str) -> Result<String, String> {
         Ok(format!("/{inner}/"))
     } else {
         Err(format!(
-            "{text:?} is no namespace; letters, digits and _ between slashes are"
+            "{text:?} is not a namespace; expected letters, digits and _ between slashes"
         ))
     }
 }

@@ -217,7 +217,7 @@ impl Server {
                 }
             }
             Ok(Some(Command::Stop) | None) => {}
-            Err(error) => warn(&format!("not understood: {line}: {error}")),
+            Err(error) => warn(&format!("cannot parse: {line}: {error}")),
         }
     }
 
@@ -310,11 +310,11 @@ impl Server {
             return Err("the executor is not active".to_owned());
         }
         if self.goals.open().is_some() {
-            return Err("another one is being executed".to_owned());
+            return Err("another plan is being executed".to_owned());
         }
         let Some(texts) = &self.texts else {
             return Err(
-                "its domain and problem are not known: ask planner/get_plan for a plan first"
+                "its domain and problem are unknown: request a plan from planner/get_plan first"
                     .to_owned(),
             );
         };
@@ -329,7 +329,7 @@ impl Server {
         let problem = texts.problem.clone();
         if !self.goals.accept(request.goal_id, stamp) {
             run.interrupt();
-            return Err("there was a goal of that number".to_owned());
+            return Err("this goal id was already used".to_owned());
         }
         warn_on_error(
             self.services

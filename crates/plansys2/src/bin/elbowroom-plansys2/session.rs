@@ -117,7 +117,7 @@ impl Session {
         let unattended = self.census.actions_without_performer(&self.hub, self.now());
         if !unattended.is_empty() {
             warn(&format!(
-                "no performer of {} was heard: what a plan starts of it will fail",
+                "no performer of {} was discovered: these actions will fail",
                 unattended.join(", ")
             ));
         }
@@ -142,7 +142,7 @@ impl Session {
                     }
                     Ok(Some(Command::Stop)) => return true,
                     Ok(None) => {}
-                    Err(error) => warn(&format!("not understood: {line}: {error}")),
+                    Err(error) => warn(&format!("cannot parse: {line}: {error}")),
                 }
             }
             Input::Closed => return true,

@@ -32,10 +32,10 @@ pub(super) fn ineffective_amount_reason(amount: &Amount, problem: &Problem) -> O
     }
     Some(match changes_continuously {
         Some((action, function)) => format!(
-            "`{action}` changes `{function}` only continuously, and what changes continuously has \
-             no amount that could be drawn; change what its rate depends on, in an [[event]]"
+            "`{action}` changes `{function}` only continuously, so that there is no amount to \
+             draw; change a fluent of its rate in an [[event]]"
         ),
-        None => format!("{} changes no such fluent", names.join(", ")),
+        None => format!("{} does not change this fluent", names.join(", ")),
     })
 }
 

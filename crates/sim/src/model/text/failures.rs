@@ -43,7 +43,7 @@ impl Reader<'_> {
         };
         if let (FailureTime::AtStart, Some(undone)) = (when, &given.undone) {
             let message =
-                "an action that does not start leaves nothing to undo; leave `undone` out";
+                "an action that does not start has no effects to undo; leave out `undone`";
             return Err(self.error_at(&undone.span(), message));
         }
         let action = self.action(section)?;
@@ -55,8 +55,8 @@ impl Reader<'_> {
             // Decimal fractions do not add up to exactly 1 in binary.
             if sum > 1.0 + 1e-9 {
                 let message = format!(
-                    "with this outcome the probabilities add up to {sum}: they are shares of the \
-                     failures, so 1 is the most"
+                    "with this outcome the probabilities add up to {sum}; as shares of the \
+                     failures they must not exceed 1"
                 );
                 let at = outcome.get_ref().probability.as_ref();
                 return Err(
@@ -77,7 +77,8 @@ impl Reader<'_> {
     fn outcome(&self, section: &Spanned<OutcomeSection>, action: &ActionPattern) -> Read<Outcome> {
         let given = section.get_ref();
         let probability = given.probability.as_ref().ok_or_else(|| {
-            let message = "`probability` is missing: how likely this is if the action fails";
+            let message = "`probability` is missing: the share of the failures that have this \
+                           outcome";
             self.error_at(&section.span(), message)
         })?;
         let mut changes: Vec<OutcomeChange> = Vec::new();
@@ -126,9 +127,9 @@ impl Reader<'_> {
             }
         };
         if changes.is_empty() && !delay.is_positive() {
-            let message = "this outcome changes nothing; say what: becomes_true, becomes_false, \
-                           assign, increase, decrease or delay. What the outcomes leave of 1 is the \
-                           failure that changes nothing";
+            let message = "this outcome changes nothing; expected becomes_true, becomes_false, \
+                           assign, increase, decrease or delay. Failures without any change need \
+                           no outcome: they are the remaining share";
             return Err(self.error_at(&section.span(), message));
         }
         Ok(Outcome {
@@ -170,7 +171,7 @@ impl Reader<'_> {
             objects.push(if word.starts_with('?') {
                 let Some(schema) = schema else {
                     return wrong(format!(
-                        "`{word}` is a parameter of no action that is named; give `action` a name"
+                        "`{word}` is a parameter, but no action is named; give `action` a name"
                     ));
                 };
                 match self.argument(word, schema, &parameter.types) {
@@ -185,9 +186,11 @@ impl Reader<'_> {
                             "write an object, or a parameter of the action such as `?x`".to_owned(),
                         );
                     }
-                    None => return wrong(format!("there is no object `{word}`")),
+                    None => return wrong(format!("unknown object `{word}`")),
                     Some(object) if !self.problem.has_type(object, &parameter.types) => {
-                        return wrong(format!("`{name}` does not fit `{word}`: its type differs"));
+                        return wrong(format!(
+                            "the type of `{name}` does not match that of `{word}`"
+                        ));
                     }
                     Some(_) => TemplateArgument::Object(word.clone()),
                 }
@@ -198,7 +201,7 @@ impl Reader<'_> {
             && rules.any(|rule| Some(rule.predicate) == self.problem.predicate(&name))
         {
             return wrong(format!(
-                "`{name}` is derived: it follows from other facts; change those"
+                "`{name}` is derived from other facts; change those"
             ));
         }
         Ok(Template { name, objects })
@@ -259,7 +262,7 @@ impl Reader<'_> {
             Ok(place)
         } else {
             Err(format!(
-                "no object that `{word}` can be is of the right type here"
+                "no object of the type of `{word}` has the type required here"
             ))
         }
     }

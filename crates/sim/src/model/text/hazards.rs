@@ -36,7 +36,7 @@ impl Reader<'_> {
         );
         if up.is_none() && down.is_none() {
             let message =
-                "say how often: becomes_true_per_second, becomes_false_per_second, or both";
+                "expected a rate: becomes_true_per_second, becomes_false_per_second, or both";
             return Err(self.error_at(&section.span(), message));
         }
         let rate = |rate: &Option<Spanned<f64>>| match rate {
@@ -58,16 +58,14 @@ impl Reader<'_> {
         };
         let mut rules = self.problem.rules.iter();
         if rules.any(|rule| rule.predicate == predicate) {
-            let message = format!(
-                "`{name}` is derived: it follows from other facts; give the rates of those"
-            );
+            let message = format!("`{name}` is derived from other facts; give the rates of those");
             return Err(self.error_at(at, message));
         }
         let facts = count(&self.problem.predicates[predicate.index()], self.problem);
         if facts.is_none_or(|facts| facts > MAX_FACTS) {
             let message = format!(
-                "`{name}` has more than {MAX_FACTS} facts, which is the most that can change by \
-                 themselves; split the predicate, or take fewer objects"
+                "`{name}` has more than {MAX_FACTS} facts, the limit for spontaneous changes; \
+                 split the predicate, or use fewer objects"
             );
             return Err(self.error_at(at, message));
         }
@@ -82,7 +80,7 @@ impl Reader<'_> {
         }
         if value * resolution.to_f64() > 1.0 {
             let message =
-                "that is more often than once in a step of `resolution`; give a smaller rate";
+                "this is more than one change per step of `resolution`; give a smaller rate";
             return Err(self.error_at(&rate.span(), message));
         }
         Ok(value)

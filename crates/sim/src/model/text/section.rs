@@ -158,7 +158,7 @@ impl Section {
         let (key, span) = given.into_iter().find(|(key, _)| !is_known(key))?;
         let known: Vec<&str> = own.iter().chain(extra).copied().collect();
         let known = known.join(", ");
-        let message = format!("`{key}` says nothing in {name}; leave it out. There are {known}");
+        let message = format!("`{key}` has no meaning in {name}; leave it out. Known are {known}");
         Some((span, message))
     }
 
