@@ -13,14 +13,14 @@ pub(crate) fn read(text: &str) -> Result<Range<i64>, TextError> {
     let ends = text.split_once(" to ");
     let ends = ends.and_then(|(start, end)| Some((time(start)?, time(end)?)));
     let Some((start, end)) = ends.filter(|(start, _)| *start < DAY) else {
-        let message = format!("`{text}` are no hours");
+        let message = format!("`{text}` is not a range of hours");
         return Err((
             message,
             "write them like `8 to 17` or `8:30 to 12`".to_owned(),
         ));
     };
     if start == end {
-        let message = format!("`{text}` is a window without length");
+        let message = format!("the window `{text}` is empty");
         return Err((message, "for the whole day, write `0 to 24`".to_owned()));
     }
     Ok(start..if start < end { end } else { end + DAY })
@@ -66,10 +66,10 @@ mod tests {
             "8 to",
         ] {
             assert!(
-                read(text).is_err_and(|it| it.0.ends_with("are no hours")),
+                read(text).is_err_and(|it| it.0.ends_with("is not a range of hours")),
                 "{text}"
             );
         }
-        assert!(read("8 to 8:00").is_err_and(|it| it.0.contains("without length")));
+        assert!(read("8 to 8:00").is_err_and(|it| it.0.contains("is empty")));
     }
 }

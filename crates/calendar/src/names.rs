@@ -27,7 +27,7 @@ pub(crate) fn ground(text: &str, kind: Kind, problem: &Problem) -> Result<Vec<St
         .split_whitespace()
         .map(str::to_ascii_lowercase);
     let Some(name) = words.next() else {
-        let message = format!("`{text}` names no {}", kind.word());
+        let message = format!("`{text}` is not the name of a {}", kind.word());
         return Err((
             message,
             "write it like `(open bakery)` or `(open _)`".to_owned(),
@@ -47,7 +47,7 @@ pub(crate) fn ground(text: &str, kind: Kind, problem: &Problem) -> Result<Vec<St
     for (argument, parameter) in arguments.iter().zip(parameters) {
         let objects = objects(argument, parameter, problem)?;
         if all.len().saturating_mul(objects.len()) > MOST_NAMES {
-            let message = format!("`{text}` names more than {MOST_NAMES} {}s", kind.word());
+            let message = format!("`{text}` matches more than {MOST_NAMES} {}s", kind.word());
             return Err((message, "name some of the objects".to_owned()));
         }
         all = all
@@ -60,7 +60,7 @@ pub(crate) fn ground(text: &str, kind: Kind, problem: &Problem) -> Result<Vec<St
             .collect();
     }
     if all.is_empty() {
-        let message = format!("`{text}` names nothing: there is no object of the type");
+        let message = format!("`{text}` matches nothing: there is no object of the type");
         return Err((message, String::new()));
     }
     Ok(all
@@ -89,7 +89,7 @@ impl Kind {
                 };
                 if problem.predicates[predicate.index()].is_derived {
                     let message = format!("`{name}` is derived from other facts");
-                    return Err((message, "give the windows of those".to_owned()));
+                    return Err((message, "give windows for those facts".to_owned()));
                 }
                 if problem.object_functions.contains(&predicate) {
                     let message = format!("`{name}` is a function whose values are objects");
@@ -139,7 +139,10 @@ fn objects(
         ));
     };
     if !problem.has_type(object, &parameter.types) {
-        let message = format!("`{argument}` has another type than `{}`", parameter.name);
+        let message = format!(
+            "the type of `{argument}` does not match that of `{}`",
+            parameter.name
+        );
         let types = parameter
             .types
             .iter()

@@ -62,7 +62,7 @@ fn calendar(
     let mut named = NamedDays::new();
     for (name, dates) in &file.dates {
         if Days::are_named(name) {
-            let message = format!("`{name}` names days already");
+            let message = format!("`{name}` is already a name of days");
             let error = report.error(dates.span(), message);
             error.advise("choose another name");
         }
@@ -114,18 +114,18 @@ fn warn_of_unused(file: &File, report: &mut Report) {
         if !used.contains(name) {
             let message = format!("no `days` or `except` uses `{name}`");
             let warning = report.warning(dates.span(), message);
-            warning.advise("name it in a section, or remove it");
+            warning.advise("use it in a section, or remove it");
         }
     }
 }
 
 fn header(file: &File, report: &mut Report) {
     if file.format.get_ref() != "elbowroom-calendar" {
-        let error = report.error(file.format.span(), "this is another kind of file");
+        let error = report.error(file.format.span(), "this is not a calendar file");
         error.advise("write format = \"elbowroom-calendar\"");
     }
     if *file.version.get_ref() != 1 {
-        let error = report.error(file.version.span(), "this version is not known");
+        let error = report.error(file.version.span(), "unsupported version");
         error.advise("write version = 1");
     }
 }
@@ -191,11 +191,11 @@ fn horizon(value: &Spanned<Value>, begin: i64, zone: &Zone, report: &mut Report)
     };
     if end == i64::MAX {
         let error = report.error(value.span(), "the horizon is too far away");
-        error.advise("leave it out where nothing recurs");
+        error.advise("leave it out if no window recurs");
         return None;
     }
     if end <= begin {
-        let error = report.error(value.span(), "the horizon is not after the beginning");
+        let error = report.error(value.span(), "the horizon is not after time 0");
         error.advise(format!("time 0 is {}", zone.date(begin)));
         return None;
     }
@@ -220,6 +220,6 @@ fn set_by(problem: &Problem) -> BTreeMap<String, &'static str> {
         TimedChange::Assign(function, of, _) => problem.apply_name(name(*function), of),
     });
     initial
-        .chain(timed.map(|name| (name, "at a time of its own")))
+        .chain(timed.map(|name| (name, "with a timed initial")))
         .collect()
 }

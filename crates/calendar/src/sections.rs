@@ -118,12 +118,12 @@ pub(crate) fn fluents(
             }
             if below.is_empty() != rule.is_always() && !mistaken.contains(&name) {
                 let message = if rule.is_always() {
-                    format!("{name} has a value for all other times already")
+                    format!("{name} already has a value for all other times")
                 } else {
-                    format!("{name} has no value for all other times yet")
+                    format!("{name} does not yet have a value for all other times")
                 };
-                let advice = "its first [[value]] has no `days`, `hours`, `from` and `to`, and the \
-                              others have some";
+                let advice = "the first [[value]] of a fluent must have none of `days`, `hours`, \
+                              `from` and `to`; the others must have at least one";
                 report.error(span, message).advise(advice);
             }
             below.push((value.clone(), windows.clone()));
@@ -166,7 +166,8 @@ fn values(layers: &[(Rational, Ranges)], begin: i64) -> Vec<(i64, Rational)> {
 /// [`MOST_WINDOWS`].
 fn too_many(count: usize, section: &Spanned<Section>, report: &mut Report) -> bool {
     if count > MOST_WINDOWS {
-        let message = format!("up to here, the calendar has more than {MOST_WINDOWS} windows");
+        let message =
+            format!("the calendar has more than {MOST_WINDOWS} windows (counted up to here)");
         let error = report.error(section.span(), message);
         error.advise("choose a nearer `horizon`, or name fewer objects");
     }
@@ -177,7 +178,7 @@ fn too_many(count: usize, section: &Spanned<Section>, report: &mut Report) -> bo
 fn refuse(section: &str, excess: &[(&str, &Option<Spanned<Value>>)], report: &mut Report) {
     for (key, value) in excess {
         if let Some(value) = value {
-            let error = report.error(value.span(), format!("{section} has no `{key}`"));
+            let error = report.error(value.span(), format!("`{key}` is not a key of {section}"));
             error.advise("leave it out");
         }
     }
@@ -294,17 +295,20 @@ fn rule(section: &Spanned<Section>, frame: &Frame, report: &mut Report) -> Optio
     if let (Some(from), Some(to), Some(value)) = (rule.from, rule.to, &given.to)
         && to <= from
     {
-        let error = report.error(value.span(), "a window without length");
+        let error = report.error(value.span(), "the window is empty");
         error.advise("`to` must be later than `from`");
         return None;
     }
     if rule.is_endless() && !frame.has_horizon() {
-        let error = report.error(section.span(), "this recurs without an end");
+        let error = report.error(section.span(), "the window recurs without an end");
         error.advise("add `horizon = \"7 days\"` to the head of the file, or `to` here");
         return None;
     }
     if rule.day_count(&frame.within) > MOST_DAYS {
-        let error = report.error(section.span(), "this recurs for more than a hundred years");
+        let error = report.error(
+            section.span(),
+            "the window recurs for more than a hundred years",
+        );
         error.advise("choose a nearer `horizon` or `to`");
         return None;
     }

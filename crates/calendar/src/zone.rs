@@ -84,7 +84,7 @@ impl Zone {
                 return Err((message, advice.to_owned()));
             }
             AmbiguousOffset::Fold { before, after } => {
-                let message = format!("{text} exists twice in {}", self.name);
+                let message = format!("{text} is ambiguous in {}", self.name);
                 let advice = format!(
                     "the clocks are set back over this time; write {text}{} for the first time or \
                      {text}{} for the second",
@@ -96,7 +96,7 @@ impl Zone {
         }
         let instant = ambiguous.compatible();
         let out_of_range = |_| {
-            let message = format!("{text} is outside of the calendar");
+            let message = format!("{text} is out of range");
             (message, "choose a year from 1 to 9999".to_owned())
         };
         instant.map(Timestamp::as_millisecond).map_err(out_of_range)
@@ -121,7 +121,7 @@ impl Zone {
         if offset == 0 || offsets.iter().any(|own| milliseconds(*own) == offset) {
             return Ok(());
         }
-        let message = format!("`{text}` has another offset than {}", self.name);
+        let message = format!("the offset of `{text}` is not that of {}", self.name);
         let own = self.offset(instant);
         let advice = format!(
             "the offset there is {own}: leave the offset out for the local time, or write UTC with `Z`"
@@ -294,7 +294,7 @@ mod tests {
         }
         for text in ["2026-11-30T11:30+05:00", "2026-11-30T05:30-01:00"] {
             let (message, advice) = instant(text).unwrap_err();
-            assert!(message.ends_with("another offset than Europe/Berlin"));
+            assert!(message.ends_with("is not that of Europe/Berlin"));
             assert!(advice.starts_with("the offset there is +01:00"), "{advice}");
         }
     }

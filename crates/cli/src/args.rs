@@ -54,10 +54,10 @@ const MAX_HELP_WIDTH: usize = 100;
     executors in simulated worlds (`compare`), and decides the controllability of temporal networks \
     (`network`).")]
 #[command(after_help = "\
-Wherever a file is asked for, `-` means standard input.
+In place of an input file, `-` means standard input.
 
 Exit codes: 0 the answer is yes, or done; 1 the answer is no; 2 the input or the command line is \
-wrong; 3 a limit was reached with nothing to show; 70 a bug.")]
+wrong; 3 a limit was reached without a result; 70 a bug.")]
 pub(crate) struct CommandLine {
     /// When to use colours: on a terminal unless `NO_COLOR` is set, always, or never
     #[arg(long, global = true, value_enum, value_name = "WHEN", default_value_t = Colour::Auto)]
@@ -115,7 +115,7 @@ const VAL_TOLERANCE: &str = "0.01";
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Validate a plan, and say what is wrong with it
+    /// Validate a plan, and report its errors
     Check(CheckArgs),
     /// Find a plan, with the embedded planner or another one
     Plan(PlanArgs),
@@ -125,28 +125,28 @@ pub(crate) enum Command {
     Envelope(Box<EnvelopeArgs>),
     /// Execute a plan, monitor it, and replan when it no longer works
     Run(Box<RunArgs>),
-    /// Run an executive that takes goals, facts and questions while it executes
+    /// Run an executive that accepts goals, facts and queries during execution
     Serve(Box<ServeArgs>),
-    /// Ask an executive something, or have it do something else
+    /// Send a query or a command to an executive
     Ctl(CtlArgs),
-    /// Play through the protocol with a program that is a world, and say what it does wrong
+    /// Check that a world program follows the protocol
     WorldCheck(WorldCheckArgs),
     /// Compare executors over many simulated runs
     Compare(CompareArgs),
     /// Learn from logs how long actions take and how often they fail
     Learn(LearnArgs),
-    /// Say how likely a plan is to succeed, where that is lost, and what would help
+    /// Compute a plan's success probability, the causes of failure, and possible improvements
     Odds(Box<OddsArgs>),
     /// Decide consistency and controllability of a temporal network
     Network(NetworkArgs),
     /// Write a plan's network, or its envelope, for other programs to check
     Export(Box<ExportArgs>),
-    /// Check, without any search, that an answer's box is inside the envelope and the largest there, or
-    /// that there is no plan
+    /// Verify an answer without search: its box is inside the envelope and the largest there, or no
+    /// plan exists
     Verify(VerifyArgs),
-    /// Validate plans and answer in VAL's words, for editors and scripts that know VAL
+    /// Validate plans with the output of VAL, for editors and scripts that expect VAL
     Val(ValArgs),
-    /// Write an answer, a run or an experiment as a page to look at in a browser
+    /// Write an answer, a run or an experiment as an HTML page
     Report(ReportArgs),
     /// Print a script that completes commands and options in a shell
     Completions(CompletionsArgs),
@@ -192,7 +192,7 @@ pub(crate) struct ValArgs {
     /// Also print the plan and the times at which something happens
     #[arg(short, long)]
     pub(crate) verbose: bool,
-    /// Durations may miss their bounds by this; times no more than a tenth of it apart count as equal.
+    /// Tolerance of the bounds of durations; times at most a tenth of it apart count as equal.
     /// Called as `Validate`, the default is VAL's own, 0.01
     #[arg(short, long, value_name = "T", default_value = "0.001", value_parser = positive_or_zero)]
     #[arg(allow_negative_numbers = true, overrides_with = "tolerance")]
@@ -201,37 +201,38 @@ pub(crate) struct ValArgs {
 
 #[derive(Args, Debug)]
 #[command(after_help = "\
-The page is one HTML file that needs no network. It shows the plan with its envelope, the run beside its \
-plan, or the rates of the experiment; docs/pages.md says what is on it.")]
+The page is one HTML file that needs no network. It shows the plan with its envelope, the run \
+next to its plan, or the rates of the experiment; docs/pages.md describes it.")]
 pub(crate) struct ReportArgs {
     /// The trace of a run (`run --trace`), an answer (`envelope --json`, `plan --json`, `run
-    /// --json`), the results of an experiment (`results.json`), or the folder that has them
+    /// --json`), the results of an experiment (`results.json`), or the folder that contains them
     /// (`compare -o DIR`)
     #[arg(value_name = "FILE")]
     pub(crate) input: PathBuf,
-    /// Write the page there instead of to standard output
+    /// Write the page to this file instead of standard output
     #[arg(short, long, value_name = "FILE.html")]
     pub(crate) output: Option<PathBuf>,
-    /// Write the run in the format of Perfetto (ui.perfetto.dev) there; without `--output`, no page
+    /// Write the run to this file in the format of Perfetto (ui.perfetto.dev); without `--output`,
+    /// no page is written
     #[arg(long, value_name = "FILE.pftrace")]
     pub(crate) perfetto: Option<PathBuf>,
-    /// Write the run as an MCAP file, for Foxglove and others, there; without `--output`, no page
+    /// Write the run to this MCAP file, for Foxglove and others; without `--output`, no page is
+    /// written
     #[arg(long, value_name = "FILE.mcap")]
     pub(crate) mcap: Option<PathBuf>,
 }
 
 #[derive(Args, Debug)]
 #[command(after_help = "\
-What is checked, and what is not: docs/largest-box.md; what a certificate is:
-docs/formats/certificate.md; that a problem has no plan: docs/formats/no-plan.md.")]
+Scope of the check: docs/largest-box.md; certificates: docs/formats/certificate.md; proofs that \
+no plan exists: docs/formats/no-plan.md.")]
 pub(crate) struct VerifyArgs {
-    /// What `elbowroom envelope --method best --json` has printed, or `elbowroom plan --json` where no
+    /// Output of `elbowroom envelope --method best --json`, or of `elbowroom plan --json` if no
     /// plan exists
     #[arg(value_name = "ANSWER.json")]
     pub(crate) answer: PathBuf,
-    /// The domain file. For a box: with problem and plan, network and conditions are derived from these
-    /// files, and nothing is assumed. For an answer that no plan exists: if the file is not where the
-    /// answer says
+    /// The domain file. For a box: network and conditions are derived from domain, problem and plan
+    /// instead of assumed. For an answer that no plan exists: replaces the path in the answer
     #[arg(value_name = "DOMAIN", requires = "problem")]
     pub(crate) domain: Option<PathBuf>,
     /// The problem file
@@ -240,7 +241,7 @@ pub(crate) struct VerifyArgs {
     /// The plan file, for a box
     #[arg(value_name = "PLAN")]
     pub(crate) plan: Option<PathBuf>,
-    /// For a box of --objective probability: the world file that it was made with, to check its
+    /// For a box of --objective probability: the world file that it was computed with, to check its
     /// probability (docs/formats/world.md)
     #[arg(long, value_name = "WORLD.toml", requires = "plan")]
     pub(crate) world: Option<PathBuf>,
@@ -307,8 +308,8 @@ pub(crate) struct CheckArgs {
     /// Print the answer as one JSON document
     #[arg(long)]
     pub(crate) json: bool,
-    /// How to print what is wrong in a text: `text`, with an excerpt, or also `lines` on standard
-    /// output, one `FILE: line: N: Error: message` for each mistake
+    /// Output of errors in input files: `text`, with an excerpt, or `lines`, which also prints one
+    /// `FILE: line: N: Error: message` per error on standard output
     #[arg(long, value_name = "FORM", value_enum, default_value_t = DiagnosticsForm::Text)]
     #[arg(hide_possible_values = true, conflicts_with = "json")]
     pub(crate) diagnostics: DiagnosticsForm,
@@ -330,7 +331,7 @@ pub(crate) struct StnArgs {
     /// The plan: `start: (action arguments) [duration]` lines, or an STN plan file
     #[arg(value_name = "PLAN")]
     pub(crate) plan: PathBuf,
-    /// Write the STN plan there instead of to standard output
+    /// Write the STN plan to this file instead of standard output
     #[arg(short, long, value_name = "FILE.stn")]
     pub(crate) output: Option<PathBuf>,
     /// Also write the network as a graph for Graphviz

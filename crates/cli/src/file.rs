@@ -65,7 +65,7 @@ fn advice(path: &Path, what: &str, error: &io::Error) -> String {
                 .filter(|folder| !folder.as_os_str().is_empty());
             match parent {
                 Some(folder) if !folder.is_dir() => {
-                    format!("there is no folder {}", folder.display())
+                    format!("the folder {} does not exist", folder.display())
                 }
                 _ => similar_file(path).map_or_else(
                     || match what {
@@ -78,7 +78,9 @@ fn advice(path: &Path, what: &str, error: &io::Error) -> String {
                 ),
             }
         }
-        ErrorKind::PermissionDenied => "you may not read it; check its permissions".to_owned(),
+        ErrorKind::PermissionDenied => {
+            "reading it is not permitted; check its permissions".to_owned()
+        }
         _ if path.is_dir() => "it is a folder; name a file in it".to_owned(),
         _ => String::new(),
     }

@@ -86,7 +86,7 @@ pub(crate) fn any_plan(
 
 /// Advice if a plan with fixed times is needed and an STN plan is given.
 pub(crate) const FIXED_TIMES_ADVICE: &str =
-    "give a plan with fixed times; its network is made from it";
+    "give a plan with fixed times; the network is derived from it";
 
 /// Reads a plan with fixed times. `advice` is shown if the file is an STN plan.
 pub(crate) fn time_triggered(

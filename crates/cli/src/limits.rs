@@ -1,9 +1,9 @@
 //! Limiting reasons of the ends of intervals, grouped by reason.
 //!
 //! ```text
-//! What limits the ends
+//! Limiting constraints
 //!   deadline of (counter-open office) at 40
-//!     upper end of d0, d2, d3
+//!     upper bound of d0, d2, d3
 //! ```
 
 use elbowroom::answers::envelope::LimitGroup;
@@ -16,12 +16,12 @@ pub(crate) fn render(limits: &[LimitGroup], look: TextLayout) -> String {
     if limits.is_empty() {
         return String::new();
     }
-    let mut text = format!("{}\n", styled(EMPHASIS, "What limits the ends"));
+    let mut text = format!("{}\n", styled(EMPHASIS, "Limiting constraints"));
     for limit in limits {
         push_wrapped(&mut text, &limit.reason, 2, look.width);
         for (names, label) in [
-            (&limit.lower, "lower end of"),
-            (&limit.upper, "upper end of"),
+            (&limit.lower, "lower bound of"),
+            (&limit.upper, "upper bound of"),
         ] {
             if !names.is_empty() {
                 let mut line = String::new();
@@ -93,12 +93,12 @@ mod tests {
         ];
         let text = anstream::adapter::strip_str(&render(&limits, TextLayout::PLAIN)).to_string();
         assert_snapshot!(text, @r"
-        What limits the ends
+        Limiting constraints
           a duration is at least 0
-            lower end of d0, d1
+            lower bound of d0, d1
           deadline of (counter-open office) at 40: end of (drop rover parcel office)
             must come 0.001 before it
-            upper end of d0, d1
+            upper bound of d0, d1
         ");
     }
 }

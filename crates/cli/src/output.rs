@@ -116,7 +116,7 @@ pub(crate) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
                 path.display(),
                 io_error_message(&error)
             ),
-            "choose a file in a folder that exists and that you may write to",
+            "choose a file in an existing, writable folder",
         )
     })
 }

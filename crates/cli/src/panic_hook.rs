@@ -24,7 +24,7 @@ fn message(panic: &PanicHookInfo<'_>) -> String {
         .location()
         .map_or_else(String::new, |location| format!(" ({location})"));
     format!(
-        "bug: elbowroom {version} contradicts itself: {what}{place}\n  \
+        "bug: internal error in elbowroom {version}: {what}{place}\n  \
          This is not your fault. Please report it at {repository}/issues\n  \
          with this message, the command line and the files you gave.",
         version = env!("CARGO_PKG_VERSION"),

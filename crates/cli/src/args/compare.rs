@@ -18,8 +18,8 @@ pub(crate) struct CompareArgs {
     /// Random seed; by default the seed of the experiment
     #[arg(long, value_name = "N")]
     pub(crate) seed: Option<u64>,
-    /// Number of threads; 0 for one per processor. Trials are shared out among them; where there are fewer
-    /// trials, the embedded planner uses the rest
+    /// Number of threads; 0 for one per processor. Trials are distributed over them; if there are
+    /// fewer trials, the embedded planner uses the others
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = count)]
     #[arg(allow_negative_numbers = true)]
     pub(crate) jobs: usize,

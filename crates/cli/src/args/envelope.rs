@@ -43,18 +43,18 @@ pub(crate) struct EnvelopeArgs {
     #[arg(long)]
     symmetric: bool,
     /// The largest box where bounds count up to a deviation of N times the nominal value (by
-    /// default 9), unless `in [LB, UB]` of --vary says less; what nothing stops is infinite all the
-    /// same
+    /// default 9), unless `in [LB, UB]` of --vary is narrower; bounds without any limit remain
+    /// infinite
     #[arg(long, value_name = "N", value_parser = positive, allow_negative_numbers = true)]
     cap: Option<Rational>,
-    /// Of IRR: step size at which the search ends, in the unit of the plan: each bound is closer to
-    /// its limit than twice this. By default a hundredth of each nominal value
+    /// IRR: step size at which the search ends, in the unit of the plan; each bound is then within
+    /// twice this of its limit. By default a hundredth of each nominal value
     #[arg(long, value_name = "B", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) precision: Option<Rational>,
-    /// Of IRR: whether the step size doubles after a success, as by default, or stays constant
+    /// IRR: step size after a success, doubled (default) or constant
     #[arg(long, value_enum)]
     pub(crate) growth: Option<Growth>,
-    /// Of IRR: finally move each bound exactly to its limit
+    /// IRR: finally move each bound exactly to its limit
     #[arg(long)]
     pub(crate) sharpen: bool,
     /// The guarantee that holds inside the envelope; by default dynamic
@@ -80,31 +80,31 @@ pub(crate) struct EnvelopeArgs {
     /// Time limit in seconds; then the best envelope found is printed
     #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) time_limit: Option<Rational>,
-    /// Time-out of each action, which the plan's promise names: `none`, a number of seconds, or `10x,600`,
-    /// the default: 10 times the planned duration, at least 600; and others for some actions:
-    /// `10x,600; drive=40; (pick a)=3x,5`. --contains refuses a box beyond it
+    /// Time-out of each action, a condition of the guarantee: `none`, a number of seconds, or
+    /// `10x,600`, the default: 10 times the planned duration, at least 600; with exceptions for
+    /// some actions: `10x,600; drive=40; (pick a)=3x,5`. --contains rejects a box beyond it
     #[arg(long, value_name = "RULE", value_parser = timeout, allow_negative_numbers = true)]
     pub(crate) timeout: Option<TimeoutRule>,
     /// Test whether this box is inside the envelope: `"dur_0=[7/4,12] (drive a b)=12 all=±10%"`;
     /// parameters that are not named keep their nominal value
     #[arg(long, value_name = "BOX")]
     pub(crate) contains: Option<String>,
-    /// The order of the rows: as in the plan, as by default, or the one with the least room first
+    /// Order of the rows: as in the plan (default), or by increasing slack
     #[arg(long, value_enum)]
     pub(crate) order: Option<Order>,
-    /// With --method exact: the volume of the region, and which share of it IRR's and the best boxes
-    /// have; exactly for up to 6 connected parameters, sampled for more
+    /// With --method exact: the volume of the region, and the shares of it that the boxes of IRR
+    /// and `best` cover; exact for up to 6 connected parameters, sampled for more
     #[arg(long)]
     pub(crate) volume: bool,
-    /// The seed of what --volume samples
+    /// Random seed of the samples of --volume
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = integer)]
     #[arg(allow_negative_numbers = true, requires = "volume")]
     pub(crate) seed: u64,
-    /// With --method exact: draw two parameters, all others having their nominal values, with IRR's
-    /// and the best boxes; named as in --contains
+    /// With --method exact: draw two parameters, all others at their nominal values, with the boxes
+    /// of IRR and `best`; named as in --contains
     #[arg(long, num_args = 2, value_names = ["X", "Y"], requires = "picture")]
     pub(crate) slice: Option<Vec<String>>,
-    /// With --method exact: draw two parameters, for some values of all others
+    /// With --method exact: draw the projection onto two parameters
     #[arg(long, num_args = 2, value_names = ["X", "Y"], requires = "picture")]
     #[arg(conflicts_with = "slice")]
     pub(crate) projection: Option<Vec<String>>,
@@ -115,8 +115,8 @@ pub(crate) struct EnvelopeArgs {
     /// bounds that makes it work
     #[arg(long)]
     pub(crate) repair: bool,
-    /// With --repair: a quantity that may change, named as in --vary, but nothing else; `weight W`
-    /// is what a unit of it costs, `in [LB, UB]` is not left; may be repeated
+    /// With --repair: a quantity that may change, named as in --vary; all others are kept. `weight
+    /// W` is the cost of a change by one unit, `in [LB, UB]` limits the new value; may be repeated
     #[arg(long, value_name = "SPEC", requires = "repair")]
     pub(crate) change: Vec<String>,
     /// With --repair: a quantity that may not change; may be repeated
@@ -159,7 +159,7 @@ impl EnvelopeArgs {
         ];
         if let Some((flag, _)) = others.iter().find(|(_, given)| *given) {
             return Err(Failure::new(
-                format!("{flag} belongs to envelopes, and --repair to changes of the plan"),
+                format!("{flag} applies to envelopes, and cannot be combined with --repair"),
                 format!("leave out --repair, or {flag}"),
             ));
         }
@@ -188,7 +188,7 @@ impl EnvelopeArgs {
             return match only_regions.iter().find(|(_, given)| *given) {
                 None => Ok(false),
                 Some((flag, _)) => Err(Failure::new(
-                    format!("{flag} is about the whole region"),
+                    format!("{flag} needs the whole region"),
                     format!("add --method exact, or leave out {flag}"),
                 )),
             };
@@ -201,7 +201,7 @@ impl EnvelopeArgs {
         }
         if self.picture.is_some() && self.slice.is_none() && self.projection.is_none() {
             return Err(Failure::new(
-                "--picture needs to know which two parameters to draw",
+                "--picture needs two parameters to draw",
                 "add `--slice X Y` or `--projection X Y`",
             ));
         }
@@ -219,14 +219,14 @@ impl EnvelopeArgs {
         ];
         if let Some((flag, _)) = only_boxes.iter().find(|(_, given)| *given) {
             return Err(Failure::new(
-                format!("{flag} is about boxes, and --method exact is about the whole region"),
+                format!("{flag} applies to boxes, but --method exact computes the whole region"),
                 format!("leave out --method exact, or {flag}"),
             ));
         }
         match self.guarantee {
             None | Some(Guarantee::Weak) => Ok(true),
             Some(_) => Err(Failure::new(
-                "the region is that of the weak guarantee; the others are about boxes",
+                "the region exists only for the weak guarantee; the other guarantees need a box",
                 "leave out --method exact, or --guarantee",
             )),
         }
@@ -255,14 +255,14 @@ impl EnvelopeArgs {
             (Some(Method::Irr), Some((flag, _))) => {
                 return Err(Failure::new(
                     format!(
-                        "{flag} is about the largest box, which --method irr does not look for"
+                        "{flag} applies to the largest box, which --method irr does not compute"
                     ),
                     format!("leave out --method irr, or {flag}"),
                 ));
             }
             (Some(Method::Exact), _) => {
                 return Err(Failure::new(
-                    "the region is no box",
+                    "the region is not a box",
                     "leave out --method exact",
                 ));
             }
@@ -280,14 +280,14 @@ impl EnvelopeArgs {
         match (best.objective, &self.world) {
             (library::Objective::Probability, None) => {
                 return Err(Failure::new(
-                    "--objective probability needs to know how long actions take",
+                    "--objective probability needs distributions of the durations",
                     "add --world with a world file (docs/formats/world.md)",
                 ));
             }
             (library::Objective::Probability, Some(_)) | (_, None) => {}
             (_, Some(_)) => {
                 return Err(Failure::new(
-                    "--world is for --objective probability",
+                    "--world applies only to --objective probability",
                     "add that, or leave out --world",
                 ));
             }
@@ -297,7 +297,7 @@ impl EnvelopeArgs {
 }
 
 const VARY_HELP: &str = "\
-What --vary can name:
+Quantities for --vary:
   durations                           all durations, those that the executor
                                       chooses included
   duration ACTIONS                    the durations of these
@@ -338,8 +338,8 @@ pub(crate) enum BoxMethod {
 /// The objective of the largest box.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Objective {
-    /// The least deviation for which any bound has room, in relation to the nominal value; then the
-    /// second least, and so on
+    /// The least slack of any bound, relative to the nominal value; then the second least, and so
+    /// on
     LeastSlack,
     /// The sum of the widths of all intervals, times the weights of --vary
     Widths,
@@ -366,16 +366,16 @@ impl From<Objective> for library::Objective {
 pub(crate) enum Order {
     /// As in the plan
     Plan,
-    /// The one with the least room in relation to its nominal value first
+    /// By increasing slack, relative to the nominal value
     Tightness,
 }
 
 /// The step size after a successful widening.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Growth {
-    /// It doubles
+    /// Double it
     Doubling,
-    /// It stays
+    /// Keep it
     Constant,
 }
 

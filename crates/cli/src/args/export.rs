@@ -14,9 +14,9 @@ use super::number::positive;
 #[derive(Args, Debug)]
 #[command(after_help = "\
 A network is written as GraphML, which the CSTNU Tool reads; to a file that ends in .txt, as plain STNU \
-text, and to one that ends in .json, as Elbowroom JSON, exactly. The others are in whole numbers: where \
-that takes another unit of time, it is told.\n\n\
-docs/second-witness.md says what each text means and how to ask others about it.")]
+text, and to one that ends in .json, as Elbowroom JSON, exactly. The other formats use integers; \
+a change of the unit of time is reported.\n\n\
+docs/second-witness.md describes the formats and how to check them with other programs.")]
 pub(crate) struct ExportArgs {
     /// The output: the network as an STNU, the box or region as SMT-LIB 2, what the best
     /// executor can reach as a process of PRISM, or the problem with its calendar as PDDL
@@ -25,21 +25,21 @@ pub(crate) struct ExportArgs {
     #[command(flatten)]
     pub(crate) problem: ProblemArgs,
     /// The plan: `start: (action arguments) [duration]` lines, or an STN plan file; not for `prism`
-    /// and `pddl`, which are about all that can be done
+    /// and `pddl`, which do not depend on a plan
     #[arg(value_name = "PLAN|FILE.stn")]
     pub(crate) plan: Option<PathBuf>,
     /// The box: `"dur_0=[7/4,12] (drive a b)=12 all=±10%"`; parameters that are not named keep
     /// their nominal value. Without a box, `smt2` writes the whole region
     #[arg(long, value_name = "BOX")]
     pub(crate) contains: Option<String>,
-    /// Take the box from there, what `elbowroom envelope --json` has printed
+    /// Take the box from this output of `elbowroom envelope --json`
     #[arg(long, value_name = "ANSWER.json", conflicts_with = "contains")]
     pub(crate) envelope: Option<PathBuf>,
     /// A quantity that may deviate, as for `elbowroom envelope`; may be repeated
     #[arg(long, value_name = "SPEC")]
     pub(crate) vary: Vec<String>,
-    /// The guarantee that `smt2` asks about; by default that of the answer, dynamic for a box, weak
-    /// for the region
+    /// The guarantee that `smt2` checks; by default that of the answer, dynamic for a box, weak for
+    /// the region
     #[arg(long, value_enum)]
     pub(crate) guarantee: Option<Guarantee>,
     /// Add the plan's conditions to the network where they bound the difference of two times, as
@@ -55,7 +55,7 @@ pub(crate) struct ExportArgs {
     pub(crate) epsilon: Rational,
     #[command(flatten)]
     pub(crate) process: ProcessArgs,
-    /// Write there instead of to standard output
+    /// Write to this file instead of standard output
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
 }
@@ -74,13 +74,13 @@ pub(crate) struct ProcessArgs {
     /// run is lost (without time; lost by default)
     #[arg(long, value_name = "RULE")]
     pub(crate) dead_ends: Option<DeadEndRule>,
-    /// Largest number of actions that run at once (without time; no limit by default)
+    /// Largest number of actions that run at the same time (without time; no limit by default)
     #[arg(long, value_name = "N")]
     pub(crate) most_running: Option<usize>,
     /// An action fails as soon as one of its conditions over all is violated (without time)
     #[arg(long)]
     pub(crate) keep_over_all: bool,
-    /// Into how many cells time is cut (on a clock; 32 by default)
+    /// Number of cells of the time axis (on a clock; 32 by default)
     #[arg(long, value_name = "N")]
     pub(crate) cells: Option<usize>,
     /// Bound of the optimum (on a clock; upper by default)
@@ -110,7 +110,7 @@ impl FromStr for DeadEndRule {
             "harmless" => Ok(Self(DeadEnds::Harmless)),
             number => match number.parse() {
                 Ok(steps @ 1..=1000) => Ok(Self(DeadEnds::Patience(steps))),
-                _ => Err("say `lost`, `harmless`, or a number from 1 to 1000".to_owned()),
+                _ => Err("write `lost`, `harmless`, or a number from 1 to 1000".to_owned()),
             },
         }
     }

@@ -23,8 +23,8 @@ pub(crate) struct LearnArgs {
     #[arg(long, value_name = "S", default_value = "0.001", value_parser = positive)]
     #[arg(allow_negative_numbers = true)]
     pub(crate) resolution: Rational,
-    /// Report a drift where the evidence for it is N to one; in logs without drift that happens
-    /// with a probability of at most 1/N for each action
+    /// Report a drift if the evidence for it is N to one; in logs without drift, the probability of
+    /// a report is at most 1/N for each action
     #[arg(long, value_name = "N", default_value = "100", value_parser = positive)]
     #[arg(allow_negative_numbers = true)]
     pub(crate) drift: Rational,
@@ -32,7 +32,7 @@ pub(crate) struct LearnArgs {
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) seed: u64,
     /// Compute intervals that hold all durations of the next execution of a plan with this
-    /// probability, whatever their distributions, and check that the plan survives all that lies in
+    /// probability, whatever their distributions, and check that the plan works for all values in
     /// them
     #[arg(long, value_name = "P", requires_all = ["domain", "problem", "plan"])]
     pub(crate) inside: Option<Rational>,

@@ -42,22 +42,22 @@ pub(crate) struct NetworkArgs {
 /// The distribution of the durations of contingent links.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum DurationsChoice {
-    /// As the file says, and evenly between the bounds where it says nothing
+    /// As in the file; uniform between the bounds of links without a distribution
     Given,
-    /// Evenly between the bounds
+    /// Uniform between the bounds
     Uniform,
 }
 
 const FORMATS_HELP: &str = "\
-Formats, told by the content:
+Formats, detected from the content:
   HEATlab JSON        `nodes` and `constraints`, of the types stc, stcu, pstc
   PSTN-lib JSON       `timepoints` and `constraints`, with correlations
   CSTNU Tool GraphML  .stn and .stnu; conditional networks are refused
   plain STNU text     begins with `# KIND OF NETWORK`
   DIMACS text         `p sp NODES ARCS`, `a U V W`
-  inequalities        JSON: lists of `[u, v, w]` under the numbers of nodes
-  Elbowroom JSON      what --minimal and --dispatchable write
+  inequalities        JSON: lists of `[u, v, w]`, keyed by the number of nodes
+  Elbowroom JSON      the output of --minimal and --dispatchable
 
-What --minimal and --dispatchable write is GraphML if the name ends in .stn, .stnu, .graphml or \
-.xml, and otherwise Elbowroom JSON, in which nothing is lost. docs/networks.md says what the answers \
-mean, docs/formats/network.md has the formats.";
+The output of --minimal and --dispatchable is GraphML if the name ends in .stn, .stnu, .graphml or \
+.xml, and otherwise Elbowroom JSON, in which nothing is lost. docs/networks.md explains the \
+answers, docs/formats/network.md describes the formats.";

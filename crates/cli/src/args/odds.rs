@@ -17,13 +17,14 @@ use super::number::{count, integer, positive};
 pub(crate) struct OddsArgs {
     #[command(flatten)]
     pub(crate) problem: ProblemArgs,
-    /// The plan; without it, the embedded planner makes one, and the best order of it is taken
+    /// The plan; without it, the embedded planner makes one, and its best order is used
     #[arg(value_name = "PLAN")]
     pub(crate) plan: Option<PathBuf>,
     /// Probabilities of success and of spontaneous change (docs/formats/likelihoods.md)
     #[arg(long, value_name = "FILE")]
     pub(crate) likelihoods: PathBuf,
-    /// Take the order of the plan's actions that is most likely to succeed, not that of its times
+    /// Use the order of the plan's actions that is most likely to succeed instead of that of its
+    /// times
     #[arg(long)]
     pub(crate) best: bool,
     /// Let a ground action overlap itself in plans that the embedded planner makes
@@ -72,7 +73,7 @@ pub(crate) struct OddsArgs {
 pub(crate) enum SemanticsChoice {
     /// The opposite of the intended value, as in paper 2
     Paper,
-    /// The fact as it was
+    /// The previous value
     World,
 }
 

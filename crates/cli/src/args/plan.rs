@@ -21,9 +21,9 @@ pub(crate) struct PlanArgs {
     /// contains `{domain}` and `{problem}`
     #[arg(long, value_name = "NAME|\"CMD\"", default_value = EMBEDDED)]
     pub(crate) planner: String,
-    /// Time limit in seconds, from reading the files on; until then better plans are looked for, by
-    /// the problem's metric or else by makespan, and each one found is reported on standard error.
-    /// Without it, the first plan is returned
+    /// Time limit in seconds, including the time for reading the files. Until then, the planner
+    /// searches for better plans by the problem's metric, or by makespan without one, and reports
+    /// each on standard error. Without it, the first plan is returned
     #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) time_limit: Option<Rational>,
     /// Return the first plan, even with a time limit
@@ -42,13 +42,12 @@ pub(crate) struct PlanArgs {
     /// the embedded planner does
     #[arg(long)]
     pub(crate) self_overlap: bool,
-    /// Memory limit in MB, of all that planning takes; by default, the states of the embedded
-    /// planner may take 2048
+    /// Memory limit of planning in MB; by default, 2048 for the states of the embedded planner
     #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u64).range(1..=1 << 40))]
     #[arg(allow_negative_numbers = true)]
     pub(crate) memory: Option<u64>,
-    /// Number of threads of the embedded planner; 0, the default, for one per processor. The plans are
-    /// the same, but come sooner
+    /// Number of threads of the embedded planner; 0, the default, for one per processor. It affects
+    /// only the speed
     #[arg(long, value_name = "N", value_parser = count, conflicts_with = "objective")]
     #[arg(allow_negative_numbers = true)]
     pub(crate) jobs: Option<usize>,
@@ -95,5 +94,5 @@ Planners:
                     the limits in seconds and MB
 
 Every plan is validated before it is printed, whichever planner made it. At the time limit and on \
-Ctrl-C the best plan so far is printed. docs/planners.md says how to install each planner and what \
-each outcome means.";
+Ctrl-C the best plan so far is printed. docs/planners.md explains how to install each planner and \
+what each outcome means.";

@@ -40,8 +40,8 @@ pub(crate) struct RunArgs {
     /// the plan no longer works
     #[arg(long, value_name = "NAME|CMD", default_value = EMBEDDED)]
     pub(crate) planner: String,
-    /// Planning time in seconds for another planner than the embedded one; without it, its first
-    /// plan is taken, within a minute
+    /// Planning time in seconds for a planner other than the embedded one; without it, its first
+    /// plan within a minute is used
     #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) planner_time: Option<Rational>,
     /// Choice of the first plan, where the embedded planner makes it: the shortest, or the
@@ -66,22 +66,22 @@ pub(crate) struct RunArgs {
     #[arg(long, value_name = "N", default_value_t = 2_000, value_parser = integer)]
     #[arg(allow_negative_numbers = true)]
     pub(crate) improve_states: u64,
-    /// Let a ground action overlap itself in plans of the embedded planner: start again before it has ended.
-    /// Without it, no plan that is made does; a given plan may, with a warning
+    /// Let a ground action overlap itself in plans of the embedded planner: start again before it
+    /// has ended. Without it, no generated plan does; a given plan may, with a warning
     #[arg(long, conflicts_with_all = ["replay", "resume"])]
     pub(crate) self_overlap: bool,
-    /// Number of threads of the embedded planner; 0 for one per processor; 1 unless it is given, as on a robot
-    /// the other processors have work of their own. The plans are the same, but come sooner
+    /// Number of threads of the embedded planner; 0 for one per processor; 1 by default, because
+    /// the other processors of a robot are in use. It affects only the speed
     #[arg(long, value_name = "N", value_parser = count, conflicts_with = "replay")]
     #[arg(allow_negative_numbers = true)]
     pub(crate) jobs: Option<usize>,
     /// The simulated world (docs/formats/world.md), or `spoiler`, an adversary that ends each
-    /// action when that is worst; without it, everything goes as planned
+    /// action at the worst time; without it, everything goes as planned
     #[arg(long, value_name = "WORLD.toml|spoiler")]
     pub(crate) world: Option<PathBuf>,
-    /// The world file that the executor believes, for example what `elbowroom learn` has written: durations, failures
-    /// and changes of facts, for the executors, first plans and envelopes that use them; or the folder of --learn.
-    /// By default that of --world; of a program nothing is known
+    /// The world file that the executor assumes, for example the output of `elbowroom learn`:
+    /// durations, failures and changes of facts, for the executors, first plans and envelopes that
+    /// use them; or the folder of --learn. By default that of --world; none with --world-process
     #[arg(long, value_name = "WORLD.toml|FOLDER")]
     pub(crate) believed: Option<PathBuf>,
     /// The box from which the spoiler chooses durations, as in `envelope --contains`; by default
@@ -103,8 +103,8 @@ pub(crate) struct RunArgs {
     #[arg(allow_negative_numbers = true)]
     #[arg(requires = "programs")]
     pub(crate) answer_within: Rational,
-    /// Number of restarts of that program after it has ended or failed. It answers for the actions that were
-    /// running; those that it does not know have failed
+    /// Number of restarts of that program after it has ended or failed. It reports the actions that
+    /// were running; those that it does not know count as failed
     #[arg(long, value_name = "N", default_value = "0", requires = "programs")]
     #[arg(allow_negative_numbers = true)]
     pub(crate) restart_world: u32,
@@ -142,7 +142,7 @@ pub(crate) struct RunArgs {
     /// --precision
     #[arg(long, value_enum)]
     pub(crate) method: Option<BoxMethod>,
-    /// Of IRR: step size at which the search for an envelope ends, in the unit of the plan; by default
+    /// IRR: step size at which the search for an envelope ends, in the unit of the plan; by default
     /// a hundredth of each nominal value
     #[arg(long, value_name = "B", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) precision: Option<Rational>,
@@ -190,8 +190,8 @@ pub(crate) struct RunArgs {
     #[arg(long, value_name = "FILE.mcap", conflicts_with = "replay")]
     pub(crate) mcap: Option<PathBuf>,
     /// Write a journal of the run to this file (docs/formats/journal.md): a trace that survives a
-    /// crash. Nothing is started that is not on the disk. A simulated world ends with the program
-    /// and has none
+    /// crash. Each start is on disk before it is sent. A simulated world ends with the program and
+    /// has no journal
     #[arg(
         long,
         value_name = "FILE",
@@ -199,8 +199,8 @@ pub(crate) struct RunArgs {
         conflicts_with_all = ["trace", "world", "realtime", "seed"]
     )]
     pub(crate) journal: Option<PathBuf>,
-    /// Learn from the journal whenever an executive rests, and at the end: this folder keeps copies of its segments,
-    /// and world.toml, the model learnt from all logs in it, for --believed
+    /// Learn from the journal whenever an executive is idle, and at the end: this folder keeps
+    /// copies of its segments, and world.toml, the model learnt from all logs in it, for --believed
     #[arg(long, value_name = "FOLDER", requires = "journals")]
     pub(crate) learn: Option<PathBuf>,
     /// Serve the page of `elbowroom report` during the run, at this port or HOST:PORT of this
@@ -220,8 +220,8 @@ pub(crate) struct RunArgs {
     /// running; all other options are taken from the journal
     #[arg(long, value_name = "FILE", conflicts_with_all = FIXED_BY_TRACE, conflicts_with = "replay")]
     pub(crate) resume: Option<PathBuf>,
-    /// Replay a stored trace and say whether the decisions are the same; all other options are
-    /// taken from the trace
+    /// Replay a stored trace and check that the decisions are the same; all other options are taken
+    /// from the trace
     #[arg(long, value_name = "TRACE", conflicts_with_all = FIXED_BY_TRACE)]
     #[arg(conflicts_with_all = ["answer_within", "restart_world", "strict_world"])]
     pub(crate) replay: Option<PathBuf>,
@@ -262,7 +262,7 @@ impl RunArgs {
         let objective = self.objective.map(Into::into);
         objective_of(method, objective, self.precision.is_some()).map_err(|_| {
             Failure::new(
-                "--objective is about the largest box, which --method irr does not look for",
+                "--objective applies to the largest box, which --method irr does not compute",
                 "leave out --method irr, or --objective",
             )
         })

@@ -16,21 +16,21 @@ const PORT: &str = "7316";
 
 #[derive(Args, Debug)]
 #[command(after_help = "\
-Without PROBLEM, the executive waits for one (`elbowroom ctl problem`). What it can be asked, and \
-what comes of that: docs/serve.md.")]
+Without PROBLEM, the executive waits for one (`elbowroom ctl problem`). docs/serve.md describes \
+its requests.")]
 #[command(mut_arg("time_limit", |it| it
     .default_value("1000000000")
     .help("Time limit of the executive, in seconds of the world; by default 30 years")))]
 #[command(mut_arg("max_replans", |it| it
-    .help("Number of new plans that may be made before the executive rests and waits for a change")))]
+    .help("Number of new plans that may be made before the executive is idle and waits for a change")))]
 #[command(mut_arg("realtime", |it| it
     .help("Run a simulated world FACTOR times as fast as the wall clock (0.000001 to 1000000000); \
            by default as fast. A world process has a clock of its own")))]
 #[command(mut_arg("serve", |it| it.hide(true)))]
 #[command(mut_arg("token", |it| it
     .requires(Resettable::Reset)
-    .help("Let those who know the token in this file change something: give goals and facts, pause, \
-           stop. Without it, the executive can only be looked at")))]
+    .help("Clients with the token in this file may change something: give goals and facts, pause, \
+           stop. Without it, the executive is read-only")))]
 #[command(mut_arg("replay", |it| it.hide(true)))]
 pub(crate) struct ServeArgs {
     #[command(flatten)]
@@ -46,8 +46,8 @@ pub(crate) struct ServeArgs {
     /// bytes, or with K, M or G; 10M by default. `--resume` then continues from the new segment
     #[arg(long, value_name = "SIZE", value_parser = size)]
     pub(crate) journal_size: Option<u64>,
-    /// Keep as many earlier segments of the journal, as FILE.1 (the last one), FILE.2, …; 1 unless it
-    /// is given
+    /// Number of earlier segments of the journal to keep, as FILE.1 (the latest), FILE.2, …; 1 by
+    /// default
     #[arg(long, value_name = "COUNT")]
     pub(crate) journal_segments: Option<usize>,
 }
@@ -76,14 +76,13 @@ fn size(text: &str) -> Result<u64, String> {
 
 #[derive(Args, Debug)]
 #[command(after_help = "\
-What there is to ask, and what the answers mean: docs/serve.md. Exit codes: 0 done; 2 refused, or \
-nobody answers.")]
+docs/serve.md describes requests and answers. Exit codes: 0 done; 2 rejected, or no answer.")]
 pub(crate) struct CtlArgs {
     /// Address of the executive: a port, HOST:PORT, or the path of its socket
     #[arg(long, value_name = "ADDRESS", value_parser = Target::read, default_value = PORT)]
     #[arg(global = true)]
     pub(crate) to: Target,
-    /// The file with the token, for what changes something
+    /// The file with the token, for requests that change something
     #[arg(long, value_name = "FILE", global = true)]
     pub(crate) token: Option<PathBuf>,
     /// Print the answer as one JSON document
@@ -107,15 +106,15 @@ pub(crate) enum CtlCommand {
     Guarantee,
     /// Print the next action and its reason
     Next,
-    /// Print each line of the trace as it comes, until the executive ends
+    /// Print each line of the trace when it is written, until the executive ends
     Events {
-        /// Begin behind line N of the trace, not with the next line
+        /// Start after line N of the trace instead of with the next line
         #[arg(long, value_name = "N")]
         after: Option<usize>,
     },
-    /// Give another goal, such as '(at rover base)', which is to be reached, too
+    /// Add a goal, such as '(at rover base)'
     Goal {
-        /// The goal, in PDDL, as it stands behind `:goal`
+        /// The goal, in PDDL, as after `:goal`
         #[arg(value_name = "GOAL")]
         goal: String,
         /// Its name; the goal of the same name is replaced
@@ -125,7 +124,7 @@ pub(crate) enum CtlCommand {
         /// values are pursued
         #[arg(long, value_name = "V", allow_negative_numbers = true)]
         value: Option<Rational>,
-        /// Deadline on the world's clock; a goal that is not achieved until then is closed as failed
+        /// Deadline on the world's clock; a goal that is not achieved by then is closed as failed
         #[arg(
             long,
             value_name = "T",
@@ -154,8 +153,9 @@ pub(crate) enum CtlCommand {
         /// Name of the client that gives the goal, for the records
         #[arg(long, value_name = "NAME")]
         by: Option<String>,
-        /// Wait until the goal is closed, or impossible from where the executive rests: exit code 0 if it is achieved, 1
-        /// if it is cancelled, failed or impossible, 3 if the executive rests because no plan was found
+        /// Wait until the goal is closed, or the executive is idle because it is impossible: exit
+        /// code 0 if it is achieved, 1 if it is cancelled, failed or impossible, 3 if the executive
+        /// is idle because no plan was found
         #[arg(long)]
         wait: bool,
     },
@@ -165,7 +165,7 @@ pub(crate) enum CtlCommand {
         #[arg(value_name = "NAME")]
         name: String,
     },
-    /// Say that a running action is done or has failed, or have it cancelled
+    /// Report that a running action is done or has failed, or cancel it
     Action {
         /// The number of its start; `ctl state` lists the running actions with their numbers
         #[arg(value_name = "TICKET")]
@@ -174,7 +174,7 @@ pub(crate) enum CtlCommand {
         #[arg(value_name = "OUTCOME", value_parser = ["done", "failed", "cancelled"])]
         becomes: String,
     },
-    /// Say that a fact is true, or is not
+    /// Report that a fact is true or false
     Fact {
         /// The fact, such as '(open door)'
         #[arg(value_name = "FACT")]
@@ -183,7 +183,7 @@ pub(crate) enum CtlCommand {
         #[arg(value_name = "true|false", default_value = "true", action = clap::ArgAction::Set)]
         becomes: bool,
     },
-    /// Say what a number is
+    /// Report the value of a number
     Number {
         /// The fluent, such as '(charge rover)'
         #[arg(value_name = "FLUENT")]
@@ -200,10 +200,10 @@ pub(crate) enum CtlCommand {
     },
     /// Stop dispatching; running actions continue
     Pause,
-    /// Go on after a pause
+    /// Resume after a pause
     Resume,
     /// End the executive; running actions are cancelled
     Stop,
-    /// Print a description of the interface, for programs that make clients
+    /// Print the OpenAPI description of the interface, for client generators
     Openapi,
 }

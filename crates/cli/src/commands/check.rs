@@ -21,8 +21,8 @@ use crate::{input, number, output};
 use elbowroom_executive::messages::count_with_noun;
 
 /// Advice if the given plan is an STN plan.
-const NETWORK_ADVICE: &str = "`elbowroom envelope` says whether all of them work; `check` judges a plan with \
-                            fixed times";
+const NETWORK_ADVICE: &str = "`elbowroom envelope` checks whether all of them work; `check` \
+                              validates a plan with fixed times";
 
 /// Maximum number of margins printed, the tightest ones; `--json` has all.
 const MARGINS_SHOWN: usize = 8;

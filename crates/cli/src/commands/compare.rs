@@ -142,8 +142,8 @@ fn merge_results(paths: &[PathBuf], experiment: &AnyExperiment) -> Result<Compar
         let text = input::source(path, "results")?;
         let part = CompareAnswer::read(text.text(), experiment).map_err(|error| match error {
             CompareError::WrongExperiment => Failure::new(
-                format!("{} is not of this experiment", path.display()),
-                "give the results of its parts, made from the same files",
+                format!("{} belongs to another experiment", path.display()),
+                "give results of parts of this experiment, computed from the same files",
             ),
             other => Failure::new(format!("{}: {other}", path.display()), ""),
         });
@@ -234,11 +234,11 @@ fn make_folder(folder: &Path) -> Result<(), Failure> {
     fs::create_dir_all(folder).map_err(|error| {
         Failure::new(
             format!(
-                "cannot make the folder {}: {}",
+                "cannot create the folder {}: {}",
                 folder.display(),
                 io_error_message(&error)
             ),
-            "choose a folder that you may make, or that exists already",
+            "choose an existing folder, or one that you may create",
         )
     })
 }

@@ -44,6 +44,6 @@ fn cannot_write(folder: &Path, error: &std::io::Error) -> Failure {
             folder.display(),
             io_error_message(error)
         ),
-        "name a folder that exists and that you may write to",
+        "choose an existing, writable folder",
     )
 }

@@ -132,19 +132,20 @@ impl Client<'_> {
         if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) {
             return Failure::new(
                 format!(
-                    "the executive at {} listens, but does not answer",
+                    "the executive at {} accepts connections, but does not answer",
                     self.arguments.to
                 ),
-                "look whether it was stopped (`ps` shows T), or its machine is overloaded, and ask again",
+                "check whether its process is stopped (state T in `ps`) or its machine is \
+                 overloaded, and try again",
             );
         }
         Failure::new(
             format!(
-                "cannot ask the executive at {}: {}",
+                "cannot reach the executive at {}: {}",
                 self.arguments.to,
                 io_error_message(error)
             ),
-            "`elbowroom serve` says where it listens; --to names another address",
+            "`elbowroom serve` prints its address; give it with --to",
         )
     }
 
@@ -183,18 +184,18 @@ impl Client<'_> {
                 escape_control(&refusal.error),
                 escape_control(&refusal.help),
             ),
-            Err(_) => self.invalid_answer(&format!("it answers with status {status}")),
+            Err(_) => self.invalid_answer(&format!("unexpected HTTP status {status}")),
         }
     }
 
     fn invalid_answer(&self, why: &str) -> Failure {
         Failure::new(
             format!(
-                "what answers at {} is no executive: {}",
+                "the server at {} is not an executive: {}",
                 self.arguments.to,
                 escape_control(why)
             ),
-            "`elbowroom serve` says where it listens; --to names another address",
+            "`elbowroom serve` prints its address; give it with --to",
         )
     }
 
@@ -229,9 +230,9 @@ impl Client<'_> {
         output::print(&if taken.taken {
             format!("{name}done\n")
         } else {
-            let until = taken.until.as_deref().unwrap_or("it can be");
+            let until = taken.until.as_deref().unwrap_or("possible");
             format!(
-                "{name}not yet taken in, but as soon as {}\n",
+                "{name}accepted, takes effect as soon as {}\n",
                 escape_control(until)
             )
         })?;
@@ -298,7 +299,10 @@ impl Client<'_> {
             return Ok(Exit::Yes);
         }
         Err(Failure::new(
-            format!("the executive at {} has gone away", self.arguments.to),
+            format!(
+                "lost the connection to the executive at {}",
+                self.arguments.to
+            ),
             "if it has a journal, `elbowroom serve --resume` continues it",
         ))
     }
@@ -356,7 +360,8 @@ fn state(state: &State) -> String {
     }
     if let Some(seconds) = state.unanswered {
         let why = format!(
-            "the world has not answered for {seconds} s: nothing is started, and no request taken in, until it does"
+            "the world has not answered for {seconds} s: until it does, no action is started and \
+             no request is processed"
         );
         let _ = writeln!(text, "{}", wrap(&why, TextLayout::of_stdout().width, 2));
     }
@@ -490,7 +495,7 @@ fn next(next: &NextNow) -> String {
     let mut text = next
         .decision
         .as_deref()
-        .unwrap_or("nothing was decided")
+        .unwrap_or("no decision yet")
         .to_owned();
     if let Some(until) = &next.until {
         let _ = write!(text, " until {}", nearest(&until.0));

@@ -39,8 +39,8 @@ pub(crate) fn run(arguments: &ExportArgs, output: &mut Output) -> Answer {
     }
     let Some(file) = &arguments.plan else {
         return Err(Failure::new(
-            "which plan is it about?",
-            "give its file after the problem's",
+            "PLAN is missing",
+            "give the plan file after the problem file",
         ));
     };
     let task = Arc::new(input::task(&arguments.problem, &arguments.epsilon, output)?);
@@ -82,7 +82,7 @@ pub(crate) fn run(arguments: &ExportArgs, output: &mut Output) -> Answer {
         }
         (ExportFormat::Stnu, None) => {
             return Err(Failure::new(
-                "a network with uncertainty needs a box: what the world may do",
+                "a network with uncertainty needs a box: the values that the world may choose",
                 "give one with --contains BOX, or --envelope ANSWER.json",
             ));
         }
@@ -105,11 +105,14 @@ pub(crate) fn run(arguments: &ExportArgs, output: &mut Output) -> Answer {
 fn timed_problem(arguments: &ExportArgs, output: &mut Output) -> Answer {
     if arguments.problem.calendar.calendar.is_none() {
         return Err(Failure::new(
-            "without a calendar, this would be the problem as it is",
+            "a calendar is missing; without one, the output would be the unchanged problem",
             "give one with --calendar (docs/calendars.md)",
         ));
     }
-    prism::reject_plan_options(arguments, "is about plans, and this is about a problem")?;
+    prism::reject_plan_options(
+        arguments,
+        "applies to plans, but `export pddl` writes a problem",
+    )?;
     let (read, warnings) = input::read(&arguments.problem, &arguments.epsilon)?;
     output.warn_about(&warnings);
     write(arguments, read.problem.text())?;
@@ -135,7 +138,7 @@ fn reject_process_options(arguments: &ExportArgs) -> Result<(), Failure> {
             ("--cells", process.cells.is_some()),
             ("--bound", process.bound.is_some()),
         ],
-        "is about processes (export prism)",
+        "applies only to `export prism`",
     )
 }
 
@@ -143,7 +146,7 @@ fn reject_options_without_networks(arguments: &ExportArgs) -> Result<(), Failure
     match arguments.guarantee {
         None => Ok(()),
         Some(_) => Err(Failure::new(
-            "--guarantee is about smt2: the network is the same for each guarantee",
+            "--guarantee applies only to smt2; the network is the same for each guarantee",
             "leave it out",
         )),
     }
@@ -166,7 +169,7 @@ fn requested_box(
         return match guarantee {
             None | Some(Guarantee::Weak) => Ok(None),
             Some(_) => Err(Failure::new(
-                "the region is that of the weak guarantee; the others are about boxes",
+                "the region exists only for the weak guarantee; the other guarantees need a box",
                 "give a box with --contains BOX or --envelope ANSWER.json, or leave out --guarantee",
             )),
         };
@@ -174,18 +177,18 @@ fn requested_box(
     let source = input::source(path, "answer")?;
     let answer: EnvelopeAnswer = serde_json::from_str(source.text()).map_err(|error| {
         Failure::new(
-            format!("this is no answer of `elbowroom envelope --json`: {error}"),
+            format!("this is not an answer of `elbowroom envelope --json`: {error}"),
             "`elbowroom envelope DOMAIN PROBLEM PLAN --json` prints one",
         )
     })?;
     if answer.settings.epsilon != *task.epsilon() {
         return Err(Failure::new(
             format!(
-                "the answer is about an epsilon of {}, not {}",
+                "the answer was computed with epsilon {}, not {}",
                 answer.settings.epsilon,
                 task.epsilon()
             ),
-            format!("say --epsilon {}", answer.settings.epsilon),
+            format!("give --epsilon {}", answer.settings.epsilon),
         ));
     }
     let envelope = export::box_of(&answer, plan).map_err(failure)?;
@@ -202,10 +205,10 @@ fn network(path: Option<&Path>, file: &NetworkFile) -> Result<String, Failure> {
     if has_ending("json") {
         return Ok(write_json(file));
     }
-    let to_json = "write to a file that ends in .json: nothing is lost there";
+    let to_json = "write to a file that ends in .json, which can express every network";
     let Some((whole, factor)) = file.in_whole_numbers() else {
         return Err(Failure::new(
-            "the numbers of this network become too large if they have to be whole",
+            "the numbers of this network become too large when they are scaled to integers",
             to_json,
         ));
     };
@@ -217,16 +220,16 @@ fn network(path: Option<&Path>, file: &NetworkFile) -> Result<String, Failure> {
     {
         return Err(Failure::new(
             format!(
-                "{} may come at any time after {}, for which there is no place in this format",
+                "{} may occur at any time after {}, which this format cannot express",
                 whole.point(link.end),
                 whole.point(link.activation)
             ),
-            format!("give the interval an upper end, or {to_json}"),
+            format!("give the interval an upper bound, or {to_json}"),
         ));
     }
     if factor != 1.into() {
         output::print_to_stderr(&format!(
-            "{}: in whole numbers; the unit of time is 1/{factor} of the plan's",
+            "{}: numbers are scaled to integers; the unit of time is 1/{factor} of the plan's",
             styled(HINT, "note")
         ));
     }
@@ -235,7 +238,7 @@ fn network(path: Option<&Path>, file: &NetworkFile) -> Result<String, Failure> {
     } else {
         write_graphml(&whole)
     };
-    text.ok_or_else(|| Failure::new("there is no place for this network in this format", to_json))
+    text.ok_or_else(|| Failure::new("this format cannot express this network", to_json))
 }
 
 fn failure(error: ExportError) -> Failure {

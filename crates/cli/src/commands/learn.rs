@@ -45,7 +45,7 @@ pub(crate) fn run(arguments: &LearnArgs, output: &mut Output) -> Answer {
             ),
         })?;
         if log.records.is_empty() {
-            output::warn(&format!("{}: no action was started in it", log.name));
+            output::warn(&format!("{}: the log contains no started action", log.name));
         }
         logs.push(log);
     }
@@ -109,7 +109,7 @@ fn conformal_request(
 fn text(request: &LearnRequest, answer: &LearnAnswer, look: TextLayout) -> String {
     let logs = count_with_noun(answer.logs.len(), "log");
     let attempts = count_with_noun(answer.attempts, "attempt");
-    let title = format!("What {logs} with {attempts} say");
+    let title = format!("Learnt from {logs} with {attempts}");
     let mut text = format!("{}\n\n", styled(EMPHASIS, &title));
     if answer.actions.is_empty() {
         text.push_str("No action was started.\n");
@@ -165,7 +165,7 @@ fn rows(request: &LearnRequest, action: &LearntAction) -> Vec<Vec<String>> {
         ]
     };
     match &action.durations {
-        LearntDurations::Unknown => vec![row(&action.action, "not known".to_owned(), failed)],
+        LearntDurations::Unknown => vec![row(&action.action, "unknown".to_owned(), failed)],
         LearntDurations::Together { group } => {
             vec![row(&action.action, distribution(group, ""), failed)]
         }
@@ -174,7 +174,7 @@ fn rows(request: &LearnRequest, action: &LearntAction) -> Vec<Vec<String>> {
             vec![row(&action.action, words, failed)]
         }
         LearntDurations::Apart { groups } => {
-            let mut rows = vec![row(&action.action, "each by itself:".to_owned(), failed)];
+            let mut rows = vec![row(&action.action, "separately:".to_owned(), failed)];
             for named in groups {
                 let words = distribution(&named.group, "");
                 let name = format!("  {}", named.action);
@@ -282,14 +282,13 @@ fn changes(text: &mut String, answer: &LearnAnswer, look: TextLayout) {
     for learnt in answer.changes.iter().filter(|it| is_surprising(&it.all)) {
         let becomes = if learnt.becomes { "true" } else { "false" };
         let words = format!(
-            "{}: that facts of {} become {becomes} {} hardly be so by chance, if the rate is the \
-             one of the world file.",
+            "{}: facts of {} became {becomes} {}, which is unlikely with the rate of the world file.",
             styled(HINT, "surprise"),
             learnt.predicate,
             if learnt.all.changes == 1 {
-                "once can".to_owned()
+                "once".to_owned()
             } else {
-                format!("{} times can", learnt.all.changes)
+                format!("{} times", learnt.all.changes)
             },
         );
         text.push('\n');
@@ -346,7 +345,8 @@ fn remarks(text: &mut String, action: &LearntAction, look: TextLayout) {
     let drifted = |drift: &DriftAnswer, what: &str| {
         let since = drift.since?;
         Some(format!(
-            "{}: {} {what} drifted, noticed at number {since} of them. The learnt model mixes values before and after.",
+            "{}: the {what} of {} drifted, detected at number {since} of them. The learnt model \
+             mixes the values before and after.",
             styled(HINT, "drift"),
             action.action
         ))
@@ -354,8 +354,8 @@ fn remarks(text: &mut String, action: &LearntAction, look: TextLayout) {
     let durations = action
         .drift
         .as_ref()
-        .and_then(|drift| drifted(drift, "durations have"));
-    let failures = drifted(&action.failure_drift, "failures have");
+        .and_then(|drift| drifted(drift, "durations"));
+    let failures = drifted(&action.failure_drift, "failures");
     for words in durations.into_iter().chain(failures) {
         remark(words);
     }
@@ -366,26 +366,27 @@ fn conformal(text: &mut String, inside: &ConformalBox, look: TextLayout) {
     let verdict = match inside.verdict {
         Verdict::Inside => format!(
             "{}: with a probability of at least {percent} %, all durations of the next run lie in these \
-             intervals, and the plan survives whatever lies in them.",
+             intervals, and the plan works for all values in them.",
             styled(SUCCESS, "inside")
         ),
         Verdict::Outside => format!(
             "{}: with a probability of at least {percent} %, all durations of the next run lie in these \
-             intervals, but the plan does not survive everything in them.",
+             intervals, but the plan does not work for all values in them.",
             styled(ERROR, "outside")
         ),
         Verdict::Undecided => format!(
             "{}: with a probability of at least {percent} %, all durations of the next run lie in these \
-             intervals, but processes and events may take another course in them, and whether the plan \
-             survives that is not known.",
+             intervals, but processes and events may behave differently in them, so it is \
+             undecided whether the plan works for all values in them.",
             styled(HINT, "undecided")
         ),
         Verdict::TooFew => format!(
-            "{}: there are too few samples to promise {percent} %.",
+            "{}: there are too few samples for a probability of {percent} %.",
             styled(ERROR, "too few")
         ),
         Verdict::NoEnvelope => format!(
-            "{}: the plan does not work even as planned; `elbowroom check` says why.",
+            "{}: the plan does not work even with its nominal durations; `elbowroom check` \
+             explains why.",
             styled(ERROR, "no envelope")
         ),
     };

@@ -43,7 +43,7 @@ pub(crate) fn run(arguments: &NetworkArgs, output: &mut Output) -> Answer {
     if arguments.minimal.is_some() && !file.is_certain() {
         return Err(Failure::new(
             "the network has contingent links, and only simple networks have a minimal form",
-            "--dispatchable writes the form to execute it by",
+            "--dispatchable writes the form that an executor uses",
         ));
     }
     let request = Request {
@@ -113,7 +113,7 @@ fn write_network(path: &Path, file: &NetworkFile) -> Result<(), Failure> {
     let text = if matches!(ending, Some("stn" | "stnu" | "graphml" | "xml")) {
         network::write_graphml(file).ok_or_else(|| {
             Failure::new(
-                "a wait of this network ends only with its link, which GraphML cannot say",
+                "a wait of this network ends only with its link, which GraphML cannot express",
                 "write to a file that ends in .json",
             )
         })?
@@ -170,7 +170,7 @@ fn push_reasons(
         let Some(promise) = promise else { continue };
         if let Some(branches) = promise.branches {
             let line = format!(
-                "Whether it is {what} was not found out in {}; --branches allows for more.",
+                "It is undecided whether it is {what}, after {}; --branches raises the limit.",
                 count_with_noun(branches, "branch").replace("branchs", "branches")
             );
             text.push('\n');
@@ -203,7 +203,7 @@ fn push_reason(text: &mut String, what: &str, reason: &Reason, look: TextLayout)
         let more = if reason.is_whole {
             format!("and {more} more (--json has all)")
         } else {
-            "and more than can be listed".to_owned()
+            "and more, too many to list".to_owned()
         };
         let _ = writeln!(text, "  {}", styled(SECONDARY, &more));
     }
@@ -236,12 +236,12 @@ fn push_simulated(text: &mut String, simulated: &Simulated, look: TextLayout) {
     let percent = |share: f64| format!("{:.1}%", share * 100.0);
     let [least, most] = simulated.interval;
     let durations = match simulated.durations {
-        Durations::Given => "as the file says",
-        Durations::Uniform => "evenly between their bounds",
+        Durations::Given => "as in the file",
+        Durations::Uniform => "uniformly between their bounds",
     };
     let executor = match simulated.executor.as_str() {
         "dispatchable" => "by the dispatchable network",
-        _ => "as early as the windows allow, which promises nothing",
+        _ => "as early as the windows allow, without a guarantee",
     };
     let mut line = format!(
         "{} of {} succeed: {}, with 95% confidence between {} and {}. Durations are drawn \
@@ -266,7 +266,7 @@ fn push_simulated(text: &mut String, simulated: &Simulated, look: TextLayout) {
     text.push('\n');
     push_wrapped(text, &line, 0, look.width);
     if !simulated.broken.is_empty() {
-        let _ = writeln!(text, "\n{}", styled(EMPHASIS, "Broken most often"));
+        let _ = writeln!(text, "\n{}", styled(EMPHASIS, "Most often violated"));
         for broken in &simulated.broken {
             let line = format!("{} ({})", broken.requirement, broken.runs);
             push_wrapped(text, &line, 2, look.width);

@@ -45,7 +45,7 @@ pub(crate) fn run(arguments: &OddsArgs, output: &mut Output) -> Answer {
     let answer = odds(&request, &mut watch).map_err(|error| {
         Failure::new(
             error,
-            "docs/probability.md says for which plans probabilities are calculated",
+            "docs/probability.md lists the plans whose probability can be computed",
         )
     })?;
     let title = format!("{}: the orders of its plan", answer.problem);
@@ -105,8 +105,8 @@ fn settings(arguments: &OddsArgs) -> Result<OddsSettings, Failure> {
             .find(|spec| spec.needs_comparator())
         {
             return Err(Failure::new(
-                format!("`{odd}` compares plans while it executes one, which is not sampled here"),
-                "leave out the number, or use `elbowroom compare`",
+                format!("`{odd}` compares plans during execution, which `odds` does not sample"),
+                "leave out the number in its name, or use `elbowroom compare`",
             ));
         }
     }

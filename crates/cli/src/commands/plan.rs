@@ -107,7 +107,7 @@ fn run_with_objective(
 ) -> Answer {
     if planner.is_some() {
         return Err(Failure::new(
-            "--objective compares plans of the embedded planner; another one gives only its own",
+            "--objective works only with the embedded planner",
             "leave out --planner, or --objective",
         ));
     }
@@ -117,14 +117,14 @@ fn run_with_objective(
         (PlanObjectiveChoice::Slack, None) => PlanAim::Slack,
         (PlanObjectiveChoice::Slack, Some(_)) => {
             return Err(Failure::new(
-                "--world says nothing to `--objective slack`",
-                "leave it out, or ask for --objective probability",
+                "--world has no effect with `--objective slack`",
+                "leave it out, or use --objective probability",
             ));
         }
         (PlanObjectiveChoice::Probability, None) => {
             return Err(Failure::new(
-                "`--objective probability` has to know the world",
-                "give it a world file with --world (docs/formats/world.md)",
+                "`--objective probability` needs a world file",
+                "give one with --world (docs/formats/world.md)",
             ));
         }
         (PlanObjectiveChoice::Probability, Some(path)) => {
@@ -155,7 +155,7 @@ fn planner_of(arguments: &PlanArgs) -> Result<Planner, Failure> {
     Planner::named(&arguments.planner).map_err(|error| {
         Failure::new(
             error,
-            "`elbowroom plan --help` says more; --planner embedded is always there",
+            "`elbowroom plan --help` lists the planners; --planner embedded is always available",
         )
     })
 }
@@ -163,7 +163,7 @@ fn planner_of(arguments: &PlanArgs) -> Result<Planner, Failure> {
 fn unsupported(error: RequestError) -> Failure {
     Failure::new(
         error,
-        "docs/planners.md says what the embedded planner supports; --planner names another one",
+        "docs/planners.md lists what the embedded planner supports; --planner selects another one",
     )
 }
 

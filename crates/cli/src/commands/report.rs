@@ -24,7 +24,7 @@ pub(crate) fn run(arguments: &ReportArgs) -> Answer {
         (None, true) => None,
         (None, false) if io::stdout().is_terminal() => {
             return Err(Failure::new(
-                "a page is not for a terminal",
+                "the page is HTML, and standard output is a terminal",
                 format!("write it to a file: -o {}", default_output(&path).display()),
             ));
         }

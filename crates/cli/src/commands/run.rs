@@ -168,7 +168,10 @@ pub(super) fn checked(
             .map_err(|wrong| contradiction_failure(SpecError::World(wrong)))?;
     }
     check_vary(&task, &spec.vary).map_err(|error| {
-        Failure::new(error, "`elbowroom help envelope` says what --vary can name")
+        Failure::new(
+            error,
+            "`elbowroom help envelope` lists the quantities for --vary",
+        )
     })?;
     spec.check().map_err(contradiction_failure)?;
     Ok((Arc::new(task), first))
@@ -225,7 +228,7 @@ pub(super) fn print_outcome(
         RESUME
     };
     Err(Failure::new(
-        format!("the journal cannot be written ({why}), so the run was ended in order"),
+        format!("the journal cannot be written ({why}), so the run was shut down"),
         format!("free some disk space; `{resume}` continues from the journal"),
     ))
 }
@@ -394,7 +397,7 @@ fn exit(outcome: &RunOutcome, trace: Option<String>) -> Answer {
     let invalid = &outcome.answer.invalid;
     if !invalid.is_empty() {
         let record = trace.map_or_else(String::new, |trace| {
-            format!(" The record of the run is {trace}.")
+            format!(" The trace of the run is {trace}.")
         });
         let label = styled(ERROR, "bug");
         output::print_to_stderr(&format!(
@@ -415,13 +418,13 @@ fn exit(outcome: &RunOutcome, trace: Option<String>) -> Answer {
         Verdict::PlannerFailed { why } => {
             return Err(Failure::new(
                 format!("the planner failed: {}", escape_control(why)),
-                "`elbowroom plan` with the same planner says more; this does not say that there is no plan",
+                "run `elbowroom plan` with the same planner for details; a plan may still exist",
             ));
         }
         Verdict::WorldFailed { why } => {
             return Err(Failure::new(
                 format!("the world failed: {}", escape_control(why)),
-                "docs/formats/world-protocol.md says what a world must do",
+                "docs/formats/world-protocol.md describes the requirements on a world",
             ));
         }
     })

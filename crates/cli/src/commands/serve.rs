@@ -148,7 +148,7 @@ fn await_problem(
         match begun {
             Ok((begun, at)) => return Some((begun, at, client)),
             Err(failure) => {
-                output::warn(&format!("a problem was refused: {}", failure.sentence()));
+                output::warn(&format!("a problem was rejected: {}", failure.sentence()));
                 router.initial_problem().reopen();
                 client.refuse(refusal(422, &failure));
             }
@@ -160,7 +160,7 @@ fn await_problem(
 fn refusal(status: u16, failure: &Failure) -> ApiError {
     let help = failure
         .advice()
-        .unwrap_or("read the messages of the executive");
+        .unwrap_or("see the messages of the executive");
     ApiError::new(status, failure.sentence(), help)
 }
 
@@ -214,7 +214,7 @@ fn check(arguments: &ServeArgs) -> Result<(), Failure> {
     for (is_given, option) in [(is_replayed, "--replay"), (is_shown, "--serve")] {
         if is_given {
             return Err(Failure::new(
-                format!("{option} belongs to `elbowroom run`"),
+                format!("{option} is an option of `elbowroom run`"),
                 "an executive listens at --http, and --resume continues its journal",
             ));
         }
@@ -223,13 +223,13 @@ fn check(arguments: &ServeArgs) -> Result<(), Failure> {
     let sized = arguments.journal_size.is_some() || arguments.journal_segments.is_some();
     if sized && !has_journal {
         return Err(Failure::new(
-            "there is no journal that could be rotated",
-            "give --journal FILE, or leave out --journal-size and --journal-segments",
+            "--journal-size and --journal-segments need a journal",
+            "give --journal FILE, or leave them out",
         ));
     }
     if run.has_adversary() {
         return Err(Failure::new(
-            "--world spoiler has no wall clock",
+            "--world spoiler cannot run on a wall clock",
             "name a world file, or a program with --world-process",
         ));
     }
@@ -255,7 +255,7 @@ fn open(
 fn announce(arguments: &ServeArgs, router: &ApiRouter) {
     let with_token = match &arguments.run.token {
         Some(_) => "",
-        None => "; read-only, as there is no --token",
+        None => "; read-only without --token",
     };
     let own = router.address();
     output::print_to_stderr(&format!("listening at http://{own}/{with_token}"));
@@ -286,7 +286,7 @@ impl ResumeHost for Server<'_> {
     ) -> Result<OperatorInterface, Error> {
         if !spec.is_persistent {
             return Err(Error::new(
-                "this is the journal of a run that ends with its goal",
+                "this is the journal of a single run (`elbowroom run`)",
                 "continue with `elbowroom run --resume`",
             ));
         }

@@ -13,8 +13,8 @@ pub(super) fn thread_count(
 ) -> Result<usize, Failure> {
     if jobs.is_some() && !is_embedded {
         return Err(Failure::new(
-            "--jobs says how many threads the embedded planner uses; another one has its own settings",
-            "leave out --jobs, or write the planner's own option into its command line",
+            "--jobs applies only to the embedded planner",
+            "leave out --jobs, or add the planner's own option to its command line",
         ));
     }
     Ok(match jobs.unwrap_or(usual) {

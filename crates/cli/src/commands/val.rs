@@ -16,7 +16,7 @@ use crate::terminal::{HINT, styled};
 use crate::{input, output};
 
 /// Advice if the given plan is an STN plan.
-const NETWORK_ADVICE: &str = "`elbowroom envelope` says whether all of them work";
+const NETWORK_ADVICE: &str = "`elbowroom envelope` checks whether all of them work";
 
 /// Number of decimal digits printed for times.
 const DIGITS: u32 = 6;

@@ -65,7 +65,7 @@ pub(crate) fn run(arguments: &VerifyArgs, output: &mut Output) -> Answer {
         }
         Err(unsuitable @ AnswerError::Unreadable(_)) => Err(Failure::new(
             unsuitable,
-            "`elbowroom envelope DOMAIN PROBLEM PLAN --method best --json` makes one",
+            "`elbowroom envelope DOMAIN PROBLEM PLAN --method best --json` prints one",
         )),
         Err(wrong) => {
             if arguments.json {
@@ -123,7 +123,7 @@ fn files(arguments: &VerifyArgs) -> Result<Option<(ProblemArgs, &Path)>, Failure
             Ok(Some((files, plan)))
         }
         _ => Err(Failure::new(
-            "the answer is about a box, and the plan is missing",
+            "PLAN is missing: the answer is about a box",
             "give all three files, `elbowroom verify ANSWER.json DOMAIN PROBLEM PLAN`, or none",
         )),
     }
@@ -193,18 +193,19 @@ fn proof_text(name: &str, verified: &Verified, is_derived: bool, look: TextLayou
     push_wrapped(&mut text, &claim, 2, look.width);
     let assumed = match (verified.assumed, verified.from_conditions) {
         (0, 0) => String::new(),
-        (0, derived) => format!(", but for {derived}, which conditions on numbers imply"),
+        (0, derived) => format!(", except for {derived} implied by conditions on numbers"),
         (assumed, _) => format!(
-            ", but for {assumed} about conditions on numbers, which the certificate only states"
+            ", except for {assumed} about conditions on numbers, which the certificate states \
+             without proof"
         ),
     };
     let how = match verified.proofs {
-        0 => "Each end is as far out as counts.".to_owned(),
+        0 => "Each bound is at the cap of its deviation.".to_owned(),
         1 => format!(
-            "It follows from 1 inequality, added up from bounds of the plan's network{assumed}."
+            "This follows from 1 inequality, a sum of bounds of the plan's network{assumed}."
         ),
         proofs => format!(
-            "It follows from {proofs} inequalities, each added up from bounds of the plan's \
+            "This follows from {proofs} inequalities, each a sum of bounds of the plan's \
              network{assumed}."
         ),
     };
@@ -213,7 +214,7 @@ fn proof_text(name: &str, verified: &Verified, is_derived: bool, look: TextLayou
         let rest = if verified.assumes.is_empty() {
             "; nothing is assumed."
         } else {
-            ". The probability was not checked against a world: `--world WORLD.toml` does that."
+            ". The probability was not checked; give its world file with `--world WORLD.toml`."
         };
         let derived = format!(
             "The box is inside the envelope: for all its values the plan can be scheduled, and every \
@@ -230,12 +231,12 @@ fn proof_text(name: &str, verified: &Verified, is_derived: bool, look: TextLayou
 /// Describes the proof that the box is inside the envelope.
 fn containment_text(inside: Option<InsideCheck>) -> String {
     let Some(inside) = inside else {
-        return "That the box is inside is not part of the certificate: `elbowroom envelope ... \
-                --contains` checks the box."
+        return "The certificate does not prove that the box is inside the envelope; check it with \
+                `elbowroom envelope ... --contains`."
             .to_owned();
     };
     let conditions = match inside.conditions {
-        Some(0) => "the plan has no conditions beside the network's".to_owned(),
+        Some(0) => "the plan has no conditions besides those of the network".to_owned(),
         Some(1) => "its condition cannot fail".to_owned(),
         Some(count) => format!("none of its {count} conditions can fail"),
         None => String::new(),
@@ -258,8 +259,8 @@ fn containment_text(inside: Option<InsideCheck>) -> String {
         }
     }
     format!(
-        "Of the box being inside the envelope, the certificate only states {}: `elbowroom envelope \
-         ... --contains` checks the box.",
+        "The certificate states without proof {}; check the box with `elbowroom envelope ... \
+         --contains`.",
         stated.join(", and ")
     )
 }

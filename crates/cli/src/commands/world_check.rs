@@ -95,7 +95,7 @@ pub(crate) fn run(arguments: &WorldCheckArgs, output: &mut Output) -> Answer {
 }
 
 fn rows_of_aborted_check(findings: Findings) -> Vec<Row> {
-    findings.rows(Some("the conversation had come to its end"))
+    findings.rows(Some("the conversation ended before this check"))
 }
 
 /// Returns the problem, and the actions to start, with their durations.
@@ -129,7 +129,7 @@ fn script(
     let actions: Vec<_> = actions.take(2).collect();
     if actions.is_empty() {
         return Err(Failure::new(
-            "no action of the plan takes time",
+            "the plan has no durative action",
             "give a plan with durative actions, or none",
         ));
     }
@@ -163,11 +163,7 @@ fn run_actions(
     wait_for_starts(player, &[0], &long, &step)?;
     wait_for_ends(player, &[0], &long, &step)?;
     if let Some(why) = player.failure(0) {
-        let why = format!(
-            "{} failed, so there was nothing to see: {}",
-            name,
-            excerpt(why)
-        );
+        let why = format!("{} failed, so this was not checked: {}", name, excerpt(why));
         player.findings.record_violation(Check::Starts, why);
         return player.poll();
     }
@@ -201,7 +197,7 @@ fn run_actions(
         advance_until(player, &limit, &Rational::ONE, |player| player.has_ended(3))?;
         player.findings.mark_done(Check::Cancels);
         if !player.has_ended(3) {
-            let why = format!("{CANCEL_TOLERANCE} s after its cancel, {name} had not ended");
+            let why = format!("{name} had not ended {CANCEL_TOLERANCE} s after it was cancelled");
             player.findings.record_violation(Check::Cancels, why);
         }
     }
@@ -245,10 +241,7 @@ fn wait_for_starts(
         if player.has_begun(*ticket) {
             continue;
         }
-        let why = format!(
-            "nothing was heard of start {ticket} within {} s",
-            long.to_f64()
-        );
+        let why = format!("start {ticket} was not reported within {} s", long.to_f64());
         player.findings.record_violation(Check::Starts, why);
     }
     Ok(())
@@ -318,16 +311,16 @@ fn text(rows: &[Row], greeting: Option<&Greeting>, conforms: bool) -> String {
                 name => escape_control(name),
             };
             let can = if greeting.can.is_empty() {
-                "no optional part".to_owned()
+                "none".to_owned()
             } else {
                 escape_control(&greeting.can.join(", "))
             };
             format!(
-                "{name} speaks version {}; it can: {can}\n",
+                "{name} uses protocol version {}; capabilities: {can}\n",
                 greeting.version
             )
         }
-        None => "the world speaks version 1: it has not introduced itself\n".to_owned(),
+        None => "the world uses protocol version 1: it sent no greeting\n".to_owned(),
     };
     for row in rows {
         let mark = match row.outcome {
@@ -346,12 +339,9 @@ fn text(rows: &[Row], greeting: Option<&Greeting>, conforms: bool) -> String {
         .filter(|row| row.outcome == Outcome::Wrong)
         .count();
     let verdict = if conforms {
-        styled(SUCCESS, "nothing is wrong")
+        styled(SUCCESS, "no violations")
     } else {
-        styled(
-            ERROR,
-            &format!("{wrong} of {} checks went wrong", rows.len()),
-        )
+        styled(ERROR, &format!("{wrong} of {} checks failed", rows.len()))
     };
     let _ = writeln!(text, "{verdict}");
     text

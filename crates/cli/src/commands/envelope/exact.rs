@@ -109,7 +109,7 @@ fn draw(
         Err(PictureError::NoRegion) => Ok(()),
         Err(error @ PictureError::Limit(_)) => Err(Failure::new(
             error,
-            "use --slice, or leave less open (--vary)",
+            "use --slice, or vary fewer quantities (--vary)",
         )),
         Err(error) => Err(Failure::new(error, "")),
     }
@@ -130,13 +130,13 @@ fn text(outcome: &RegionOutcome, look: TextLayout) -> String {
         RegionFinding::Unscheduled => {
             say(&format!("{}: {file}", styled(ERROR, "no region")), 0);
             say(
-                "The plan has no schedule at its nominal values, and the region goes by the order \
-                 that happenings have there.",
+                "The plan has no schedule at its nominal values. The region is computed for the \
+                 order of happenings in such a schedule.",
                 2,
             );
         }
         RegionFinding::None { reason } => {
-            say(&format!("{}: {file}", styled(HINT, "not known")), 0);
+            say(&format!("{}: {file}", styled(HINT, "undecided")), 0);
             say(&format!("{reason}."), 2);
         }
         RegionFinding::Region {
@@ -149,24 +149,27 @@ fn text(outcome: &RegionOutcome, look: TextLayout) -> String {
             inequalities: _,
         } => {
             if parameters.is_empty() {
-                say(&format!("{file}: there is nothing that may vary."), 0);
+                say(
+                    &format!("{file}: no quantity of the plan may vary (--vary)."),
+                    0,
+                );
                 return text;
             }
             match &pieces[..] {
                 [] => say(
-                    &format!("{}: {file} works with no values.", styled(ERROR, "empty")),
+                    &format!("{}: {file} works for no values.", styled(ERROR, "empty")),
                     0,
                 ),
                 [_] => say(
                     &format!(
-                        "{}: {file} works with all values that satisfy",
+                        "{}: {file} works for all values that satisfy",
                         styled(SUCCESS, "exact")
                     ),
                     0,
                 ),
                 several => say(
                     &format!(
-                        "{}: {file} works with all values that satisfy one of {}",
+                        "{}: {file} works for all values that satisfy one of {}",
                         styled(SUCCESS, "exact"),
                         count_with_noun(several.len(), "list")
                     ),
@@ -181,7 +184,7 @@ fn text(outcome: &RegionOutcome, look: TextLayout) -> String {
                 rows(piece, look, &mut text);
             }
             if let Some(missing) = missing {
-                let words = format!("part: there may be more, for {missing}");
+                let words = format!("incomplete: the region may be larger, because {missing}");
                 push_wrapped(&mut text, &words, 0, look.width);
             }
             text.push('\n');
@@ -190,7 +193,7 @@ fn text(outcome: &RegionOutcome, look: TextLayout) -> String {
             }
             for parameter in parameters {
                 let words = format!(
-                    "{}: {}, {} as planned",
+                    "{}: {}, nominal value {}",
                     parameter.name, parameter.quantity, parameter.nominal
                 );
                 push_wrapped(&mut text, &words, 0, look.width);
@@ -208,7 +211,7 @@ fn volume(measure: &Measure, boxes: &[BoxAnswer], look: TextLayout, text: &mut S
             let exact = volume.0.to_string();
             let words = if exact.len() > MOST_DIGITS {
                 format!(
-                    "volume: 10^{:.2}, exactly (--json has all digits)",
+                    "volume: 10^{:.2}, exact (--json has all digits)",
                     measure.log10
                 )
             } else {
@@ -217,7 +220,7 @@ fn volume(measure: &Measure, boxes: &[BoxAnswer], look: TextLayout, text: &mut S
             say(&words);
         }
         (None, Some([lower, upper])) => say(&format!(
-            "volume: 10^{:.2}, sampled: with 95 % between 10^{lower:.2} and 10^{upper:.2}",
+            "volume: 10^{:.2}, sampled: 95 % confidence interval 10^{lower:.2} to 10^{upper:.2}",
             measure.log10
         )),
         (None, None) => say(&format!("volume: 10^{:.2}", measure.log10)),
@@ -231,16 +234,16 @@ fn volume(measure: &Measure, boxes: &[BoxAnswer], look: TextLayout, text: &mut S
     for own in boxes {
         let name = match own.name.as_str() {
             "irr" => "IRR's box",
-            "least-slack" => "the box with the best least slack",
-            _ => "the box with the best sum of widths",
+            "least-slack" => "the box with the largest least slack",
+            _ => "the box with the largest sum of widths",
         };
         let Some(share) = &own.share else {
             continue;
         };
         let words = match share.interval {
-            None => format!("{name} has {} of it", percent(share.decimal)),
+            None => format!("{name} covers {} of it", percent(share.decimal)),
             Some([lower, upper]) => format!(
-                "{name} has {} of it, with 95 % between {} and {}",
+                "{name} covers {} of it (95 % confidence interval {} to {})",
                 percent(share.decimal),
                 percent(lower),
                 percent(upper)

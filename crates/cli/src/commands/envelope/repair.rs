@@ -28,7 +28,7 @@ const DIGITS: u32 = 6;
 const REASONS_SHOWN: usize = 8;
 /// Limitation of the answer if not all other orders were searched.
 const OTHER_ORDERS: &str =
-    "Other orders of interfering actions were not searched to the end; one may cost less.";
+    "The search of other orders of interfering actions was incomplete; one may cost less.";
 
 /// Prints the cheapest repair.
 pub(super) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
@@ -115,7 +115,7 @@ fn text(outcome: &RepairOutcome, given: &AnyPlan, look: TextLayout) -> String {
                 Orders::Kept => " in the order of its interfering actions",
             };
             say(
-                &format!("{no}: nothing that may change makes {file} work{order}"),
+                &format!("{no}: no allowed change makes {file} work{order}"),
                 0,
             );
             for reason in because.iter().take(REASONS_SHOWN) {
@@ -126,7 +126,7 @@ fn text(outcome: &RepairOutcome, given: &AnyPlan, look: TextLayout) -> String {
             }
         }
         RepairFinding::None { reason, bound } => {
-            let unknown = styled(HINT, "not known");
+            let unknown = styled(HINT, "undecided");
             say(&format!("{unknown}: {file}"), 0);
             let bound = bound.to_decimal(DIGITS);
             say(&format!("{reason}; no repair costs less than {bound}."), 2);
@@ -156,7 +156,8 @@ fn text(outcome: &RepairOutcome, given: &AnyPlan, look: TextLayout) -> String {
                 ),
                 ([], _) => say(
                     &format!(
-                        "{works}: {file} works within bounds of its own, and nothing else has to change"
+                        "{works}: {file} works if the dispatcher enforces the bounds below; \
+                         nothing else has to change"
                     ),
                     0,
                 ),
@@ -173,18 +174,12 @@ fn text(outcome: &RepairOutcome, given: &AnyPlan, look: TextLayout) -> String {
             }
             if *reordered {
                 say(
-                    "Interfering actions come in another order than in the plan.",
+                    "The order of interfering actions differs from that of the plan.",
                     0,
                 );
             }
-            section(
-                &mut text,
-                "What makes that necessary",
-                because,
-                changes,
-                look,
-            );
-            section(&mut text, "Bounds to keep to", keeps, &[()], look);
+            section(&mut text, "Reasons for the changes", because, changes, look);
+            section(&mut text, "Bounds to enforce", keeps, &[()], look);
             if let Some(why_not) = not_guaranteed {
                 let caution =
                     format!("The plan is valid at these times, but not guaranteed: {why_not}");
@@ -192,11 +187,7 @@ fn text(outcome: &RepairOutcome, given: &AnyPlan, look: TextLayout) -> String {
             }
             if let Some((task, plan)) = &outcome.repaired {
                 // Writing to a string cannot fail.
-                let _ = writeln!(
-                    text,
-                    "\n{}",
-                    styled(EMPHASIS, "The plan, as the judge accepted it")
-                );
+                let _ = writeln!(text, "\n{}", styled(EMPHASIS, "The plan, as validated"));
                 for line in plan_text(task, plan).lines() {
                     let _ = writeln!(text, "  {line}");
                 }
@@ -244,10 +235,11 @@ fn optimality_text(cost: &Rational, bound: &Rational, orders: Orders) -> String 
         Orders::Kept => " in this order of interfering actions",
     };
     if cost == bound {
-        format!("Nothing cheaper makes it work{order} (cost {costs}).")
+        format!("No cheaper change makes it work{order} (cost {costs}).")
     } else {
         format!(
-            "All that makes it work{order} costs more than {costs}, but as little more as wanted."
+            "Each change that makes it work{order} costs more than {costs}; the excess can be \
+             arbitrarily small."
         )
     }
 }

@@ -55,7 +55,7 @@ pub(super) fn text(
             text
         }
         EnvelopeFinding::None { .. } => {
-            "nothing is known yet: the search was stopped before it began\n".to_owned()
+            "no result yet: the search was stopped before its first check\n".to_owned()
         }
     }
 }
@@ -111,7 +111,7 @@ fn push_reason(
             text.push_str(&example(&request.task, plan, why_not, look));
             return;
         }
-        let title = "Whatever an executor does, the world can spoil it";
+        let title = "Every execution strategy can fail";
         let _ = write!(text, "\n{}\n", styled(EMPHASIS, title));
         for play in &why_not.strategies {
             push_wrapped(text, play, 2, look.width);
@@ -151,7 +151,7 @@ fn envelope(
     let title = format!("Elbow room of {}", request.name);
     let mut text = format!("{}\n\n", styled(EMPHASIS, &title));
     if rows.is_empty() {
-        text.push_str(" Nothing in this plan is left open. It works as it is.\n");
+        text.push_str(" No quantity of this plan may deviate. It works as it is.\n");
         if let Some(chosen) = chosen_durations_text(chosen) {
             push_paragraph(&mut text, &chosen, look.width);
         }
@@ -184,7 +184,7 @@ fn envelope(
         push_paragraph(&mut text, &foresight_text(foresight), look.width);
     }
     if let Some(makespans) = makespans {
-        push_paragraph(&mut text, &makespan(makespans), look.width);
+        push_paragraph(&mut text, &makespan(makespans, parameters), look.width);
     }
     if let Some(met) = condition_text(conditions) {
         push_paragraph(&mut text, &met, look.width);
@@ -208,45 +208,42 @@ fn envelope(
 
 /// States the uniform deviation of all quantities that the plan tolerates.
 fn headline(balance: &UniformSlack, parameters: &[LimitedRange]) -> String {
-    let is_duration = |room: &LimitedRange| room.range.quantity.kind == QuantityKind::Duration;
-    let (subject, more, less) = if parameters.iter().all(is_duration) {
-        ("take", "longer", "less time")
-    } else {
-        ("be", "more", "less")
+    let subject = match parameters {
+        [_] => "Tolerated deviation".to_owned(),
+        _ => format!("Uniform scaling of all {}", noun(parameters)),
     };
-    let all = if parameters.len() == 1 {
-        "It"
-    } else {
-        "All of it"
-    };
-    let way = |deviation: &Deviation, which: &str| {
+    let way = |deviation: &Deviation, sign: &str| {
         let share = &deviation.share * &Rational::from(100);
         let digits = u32::from(share < Rational::from(10));
         let percent = number::rounded(&share, digits, Rounding::Down);
         match &deviation.limit {
-            _ if deviation.share.is_zero() => format!("no {which}"),
             // All quantities may have their least values.
-            _ if which == less && deviation.share >= Rational::ONE => format!("any {which}"),
-            Some(_) => format!("up to {percent} % {which}"),
-            None => format!("more than {percent} % {which}"),
+            _ if sign == "-" && deviation.share >= Rational::ONE => "-100 %".to_owned(),
+            None if !deviation.share.is_zero() => format!("beyond {sign}{percent} %"),
+            _ => format!("{sign}{percent} %"),
         }
     };
-    let at_once = if parameters.len() == 1 {
-        ""
-    } else {
-        " at once"
-    };
     let mut line = format!(
-        "{all} may {subject} {}{at_once}, or {}",
-        way(&balance.more, more),
-        way(&balance.less, less),
+        "{subject}: {} to {}",
+        way(&balance.less, "-"),
+        way(&balance.more, "+"),
     );
     let either = &balance.either;
     if either.share < balance.more.share.clone().min(balance.less.share.clone()) {
-        let _ = write!(line, ", or {}", way(either, "off either way"));
+        let _ = write!(line, "; independent deviations: {}", way(either, "±"));
     }
     line.push('.');
     line
+}
+
+/// Returns a plural noun for the quantities.
+fn noun(parameters: &[LimitedRange]) -> &'static str {
+    let is_duration = |own: &LimitedRange| own.range.quantity.kind == QuantityKind::Duration;
+    if parameters.iter().all(is_duration) {
+        "durations"
+    } else {
+        "quantities"
+    }
 }
 
 /// Describes how conditions that are not bounds on a single time difference are met, and which
@@ -262,7 +259,7 @@ fn condition_text(conditions: &Conditions) -> Option<String> {
     if conditions.enforced > 0 {
         let count = conditions.enforced;
         met.push(format!(
-            "Bounds added for the dispatcher to keep to (--enforce): {count}."
+            "Bounds added for the dispatcher to enforce (--enforce): {count}."
         ));
     }
     (!met.is_empty()).then(|| met.join(" "))
@@ -291,7 +288,7 @@ fn foresight_text(foresight: &ValueOfInformation) -> String {
         others => format!(" and {others} more"),
     };
     format!(
-        "With {}{others} known in advance, the intervals would be {much} in sum (--guarantee weak).",
+        "Knowing {}{others} in advance would make the intervals {much} in total (--guarantee weak).",
         named.join(", ")
     )
 }
@@ -332,15 +329,16 @@ fn chosen_durations_text(chosen: &[ChosenDuration]) -> Option<String> {
 }
 
 /// States the makespan of the plan with all actions started as early as possible.
-fn makespan(makespans: &Makespans) -> String {
-    let mut line = format!("Done at {} as planned", number::nearest(&makespans.nominal));
+fn makespan(makespans: &Makespans, parameters: &[LimitedRange]) -> String {
+    let all = noun(parameters);
+    let mut line = format!("Makespan {} (nominal)", number::nearest(&makespans.nominal));
     for (time, which) in [
         (&makespans.at_lower, "lower"),
         (&makespans.at_upper, "upper"),
     ] {
         if let Some(time) = time {
             let time = number::nearest(time);
-            let _ = write!(line, ", at {time} with all at their {which} ends");
+            let _ = write!(line, ", {time} (all {all} at their {which} bounds)");
         }
     }
     line.push_str(", if started as early as possible.");
@@ -369,14 +367,14 @@ fn search_end_text(
                 .flat_map(|room| [&room.lower_limit, &room.upper_limit]);
             let is_any = limits.any(|limit| limit.as_deref() == Some(elbowroom::ANY_FINITE));
             let any = if is_any { " or has none" } else { "" };
-            // Ends without a reason are at the farthest value that the search tries.
+            // Bounds without a reason are at the farthest value that the search tries.
             let (which, untold) = if parameters.iter().any(has_unknown_limit) {
                 (
-                    "Each end with a reason",
-                    ". Where no reason is given, an end could still move",
+                    "Each bound with a reason",
+                    ". Bounds without a reason could move further",
                 )
             } else {
-                ("Each end", "")
+                ("Each bound", "")
             };
             format!("{which} is at its limit{any}{untold}")
         }
@@ -389,25 +387,26 @@ fn search_end_text(
                 None => number::nearest(&request.search.precision),
             };
             let untold = if parameters.iter().any(has_unknown_limit) {
-                " Where no reason is given, an end could still move."
+                " Bounds without a reason could move further."
             } else {
                 ""
             };
             format!(
-                "The search ended at steps of {steps} (--precision); --sharpen moves each end to its \
-                 limit.{untold}"
+                "The search ended at step size {steps} (--precision); --sharpen moves each bound \
+                 to its limit.{untold}"
             )
         }
         Stop::CheckLimit | Stop::TimeLimit => {
-            "The time limit came before the search was done; the intervals could be wider"
+            "The time limit was reached before the search was complete; the intervals could be wider"
                 .to_owned()
         }
         Stop::Undecided => {
-            "Some wider boxes have too many cases to decide; the intervals could be wider"
+            "Some wider boxes are undecided because they have too many cases; the intervals could \
+             be wider"
                 .to_owned()
         }
         Stop::Cancelled => {
-            "Interrupted before the search was done; the intervals could be wider".to_owned()
+            "Interrupted before the search was complete; the intervals could be wider".to_owned()
         }
     }
 }

@@ -19,7 +19,7 @@ const CELLS: usize = 32;
 pub(super) fn text(arguments: &ExportArgs, output: &mut Output) -> Result<String, Failure> {
     reject_plan_options(
         arguments,
-        "is about plans, and a process is about all that can be done",
+        "applies to plans, but a process contains all applicable actions",
     )?;
     let process = &arguments.process;
     match (&process.likelihoods, &process.world) {
@@ -29,7 +29,7 @@ pub(super) fn text(arguments: &ExportArgs, output: &mut Output) -> Result<String
                     ("--cells", process.cells.is_some()),
                     ("--bound", process.bound.is_some()),
                 ],
-                "is about processes on a clock, and --likelihoods asks for one without time",
+                "applies only to processes on a clock, but --likelihoods selects one without time",
             )?;
         }
         (None, Some(_)) => {
@@ -39,14 +39,14 @@ pub(super) fn text(arguments: &ExportArgs, output: &mut Output) -> Result<String
                     ("--most-running", process.most_running.is_some()),
                     ("--keep-over-all", process.keep_over_all),
                 ],
-                "is about processes without time, and --world asks for one on a clock",
+                "applies only to processes without time, but --world selects one on a clock",
             )?;
         }
         (None, None) => {
             return Err(Failure::new(
-                "a process needs to know how likely things are",
-                "give --likelihoods FILE for the one without time, or --world WORLD.toml for the one \
-                 on a clock",
+                "a process needs probabilities",
+                "give --likelihoods FILE for a process without time, or --world WORLD.toml for \
+                 one on a clock",
             ));
         }
     }
@@ -79,7 +79,7 @@ pub(super) fn text(arguments: &ExportArgs, output: &mut Output) -> Result<String
     written.map_err(|error| {
         let advice = match error {
             PrismError::NotTabulated(_) | PrismError::Unsupported(_) | PrismError::NotSmall(_) => {
-                "docs/second-witness.md lists the problems that have processes"
+                "docs/second-witness.md lists the problems that can be written as processes"
             }
             _ => "",
         };

@@ -30,7 +30,7 @@ pub(super) fn render(answer: &OddsAnswer, with_layers: bool, look: TextLayout) -
         OddsFinding::Invalid { violation } => {
             let mut text = String::new();
             let words = format!(
-                "{}: {}; `elbowroom check` says more.",
+                "{}: {}; `elbowroom check` explains why.",
                 styled(ERROR, "not valid"),
                 violation.message
             );
@@ -57,10 +57,10 @@ fn summary(order: &OrderAnswer, look: TextLayout) -> String {
     let title = format!("Succeeds with probability {}", number(order.probability));
     let _ = writeln!(text, "{}\n", styled(EMPHASIS, &title));
     let which = match (order.is_best, order.is_proven) {
-        (false, _) => "The order is that of the plan's times.",
-        (true, Some(true)) => "The order is the best of all of the plan's actions.",
+        (false, _) => "This is the order of the plan's times.",
+        (true, Some(true)) => "This is the best order of the plan's actions.",
         (true, _) => {
-            "The order is the best that was found within the limit of the search; there may be a better one."
+            "This is the best order found within the search limit; there may be a better one."
         }
     };
     let mut words = format!(
@@ -70,13 +70,13 @@ fn summary(order: &OrderAnswer, look: TextLayout) -> String {
         number(order.probability)
     );
     if !order.has_time {
-        words.push_str(" Durations and timed initials leave no time for it.");
+        words.push_str(" Durations and timed initials admit no schedule in this order.");
     }
     if order.assumed_conditions > 0 {
         let count = count_with_noun(order.assumed_conditions, "condition");
         let _ = write!(
             words,
-            " {count} on numbers that depend on when things happen were taken for granted."
+            " {count} on numbers that depend on the schedule were assumed to hold."
         );
     }
     push_paragraph(&mut text, &words, look.width);
@@ -127,7 +127,7 @@ fn losses(text: &mut String, order: &OrderAnswer, look: TextLayout) {
     if losses.is_empty() {
         return;
     }
-    heading(text, "Where it is lost");
+    heading(text, "Causes of failure");
     let others: f64 = losses.iter().skip(MOST_ROWS).map(|loss| loss.mass).sum();
     let mut rows: Vec<Vec<String>> = losses
         .iter()
@@ -138,18 +138,18 @@ fn losses(text: &mut String, order: &OrderAnswer, look: TextLayout) {
         let elsewhere = format!("{} more", losses.len() - MOST_ROWS);
         rows.push(vec![number(others), elsewhere, String::new()]);
     }
-    table(text, &["lost", "at", "because"], rows, look);
+    table(text, &["lost", "at", "cause"], rows, look);
 }
 
 fn reason(reason: &LossReason) -> String {
     let since = |condition: &str, since: &Option<String>| match since {
-        Some(since) => format!("{condition} does not hold, since {since}"),
-        None => format!("{condition} does not hold any more"),
+        Some(since) => format!("{condition} does not hold, last changed by {since}"),
+        None => format!("{condition} no longer holds"),
     };
     match reason {
         LossReason::Start => "it does not start".to_owned(),
         LossReason::End => "it fails".to_owned(),
-        LossReason::During { action } => format!("{action} fails on its way"),
+        LossReason::During { action } => format!("{action} fails while it is running"),
         LossReason::Condition {
             condition,
             since: by,
@@ -175,9 +175,9 @@ fn gains(text: &mut String, odds: &Odds, look: TextLayout) {
         let name = &action.action;
         ways.push((action.if_certain, format!("{name} never failed")));
         let retried = action.if_retried.filter(|p| *p < action.if_certain);
-        ways.extend(retried.map(|p| (p, format!("{name} were tried until it starts"))));
+        ways.extend(retried.map(|p| (p, format!("{name} were retried until it starts"))));
         let again = action.if_done_again.filter(|p| *p < action.if_certain);
-        ways.extend(again.map(|p| (p, format!("{name} were done again until it succeeds"))));
+        ways.extend(again.map(|p| (p, format!("{name} were repeated until it succeeds"))));
     }
     for fact in &order.facts {
         ways.push((
@@ -188,7 +188,7 @@ fn gains(text: &mut String, odds: &Odds, look: TextLayout) {
     ways.retain(|(p, _)| *p - order.probability >= NEGLIGIBLE);
     ways.sort_by(|a, b| b.0.total_cmp(&a.0));
     ways.truncate(MOST_ROWS);
-    heading(text, "What would help");
+    heading(text, "Possible improvements");
     let row = |p: f64, what: String| vec![number(p), what];
     let mut rows: Vec<Vec<String>> = Vec::new();
     let mut unknown: Vec<(String, String)> = Vec::new();
@@ -200,10 +200,13 @@ fn gains(text: &mut String, odds: &Odds, look: TextLayout) {
         },
     };
     let gains = &odds.gains;
-    value(&gains.any_action, "any action, chosen as the state asks");
+    value(
+        &gains.any_action,
+        "any actions, chosen according to the state",
+    );
     value(
         &gains.as_the_state_asks,
-        "the plan's actions, repeated and skipped as the state asks",
+        "the plan's actions, repeated or skipped according to the state",
     );
     let best = |best: &BestOrderAnswer, what: &str| {
         let perhaps = if best.is_proven { "" } else { " found" };
@@ -219,10 +222,10 @@ fn gains(text: &mut String, odds: &Odds, look: TextLayout) {
         ways.into_iter()
             .map(|(p, what)| row(p, format!("if {what}"))),
     );
-    table(text, &["then", "with"], rows, look);
+    table(text, &["P", "change"], rows, look);
     for (what, why) in unknown {
         let words = format!(
-            "{}: what this would gain is not calculated: {what}: {why}",
+            "{}: gain not computed for {what}: {why}",
             styled(HINT, "note")
         );
         text.push('\n');
@@ -260,7 +263,7 @@ fn executed(text: &mut String, all: &[ExecutedAnswer], look: TextLayout) {
         "new plans",
         "reached",
         "95 % interval",
-        "mostly lost to",
+        "main cause",
     ];
     table(text, &headings, rows.collect(), look);
 }

@@ -97,7 +97,7 @@ impl fmt::Display for PlanQuality {
             write!(f, ", metric {}", number::nearest(metric))?;
         }
         if let Some(worth) = &self.objective {
-            write!(f, ", worth {worth}")?;
+            write!(f, ", objective {worth}")?;
         }
         Ok(())
     }

@@ -54,7 +54,7 @@ pub(super) fn summary(answer: &PlanAnswer) -> Option<String> {
         PlanStop::Exhausted => "the search found no better one",
         // Another planner may have been about to prove optimality when it was ended.
         PlanStop::FirstPlan if answer.planner != EMBEDDED => "not proved optimal",
-        PlanStop::FirstPlan => "not proved optimal; --time-limit looks for better ones",
+        PlanStop::FirstPlan => "not proved optimal; --time-limit searches for better ones",
         _ => "not proved optimal",
     };
     let _ = write!(text, "; {plans} found, {better}");
@@ -67,9 +67,9 @@ pub(super) fn certificate_text(answer: &PlanAnswer, look: TextLayout) -> Option<
         PlanFinding::Plan { .. } => return None,
         PlanFinding::NoPlan { certificate, .. } => {
             let by = match certificate.kind() {
-                Kind::Apart => "pairs that are never true together",
+                Kind::Apart => "pairs of facts that are never true together",
                 Kind::Closed => "a closed set of states",
-                Kind::Reached => "what can become true, and when",
+                Kind::Reached => "the earliest times of all reachable facts",
             };
             format!("certified by {by}; --json prints the certificate")
         }
@@ -113,8 +113,8 @@ fn choice_text(choice: &PlanChoice) -> String {
     } else {
         let _ = write!(
             text,
-            ", beside {shortest} of the shortest, which ends at {}; best of {plans} compared, made \
-             {made_for}",
+            ", compared with {shortest} for the shortest plan (makespan {}); best of {plans} \
+             compared, made {made_for}",
             number::nearest(&shortest_makespan.0)
         );
     }
@@ -125,7 +125,7 @@ fn choice_text(choice: &PlanChoice) -> String {
 pub(super) fn repair_text(planner: &str, objection: &str) -> String {
     format!(
         "{}: the plan of {planner} is not valid as it stands, perhaps because its times are \
-         rounded\n  {objection}\n  {}: times close to these, which are valid, are taken instead",
+         rounded\n  {objection}\n  {}: valid times close to these are used instead",
         styled(HINT, "warning"),
         styled(HINT, "note"),
     )
@@ -136,17 +136,17 @@ pub(super) fn failure(failure: PlannerFailure) -> Failure {
     let in_words = failure.to_string();
     match failure.outcome {
         Outcome::Crashed { excerpt, .. } => {
-            let help = "this is a fault of that planner; try another one";
+            let help = "this is an error in that planner; try another one";
             with_excerpt(in_words, "its last output", &excerpt, help)
         }
         Outcome::NotUnderstood { excerpt, .. } => {
-            let help = "if this is a complaint about the command line or the domain, see \
-                        docs/planners.md for what this planner wants";
+            let help = "if the output complains about the command line or the domain, see \
+                        docs/planners.md for the requirements of this planner";
             with_excerpt(in_words, "its last output", &excerpt, help)
         }
         Outcome::Refused { plan, .. } => {
-            let help = "this plan is the planner's, and is not printed as an answer; \
-                        `elbowroom check` says more about it";
+            let help = "the planner's plan is invalid, so it is not printed as an answer; \
+                        `elbowroom check` explains why";
             with_excerpt(in_words, "its plan", &plan, help)
         }
         Outcome::NotStarted { help, .. } => Failure::new(in_words, help),

@@ -38,7 +38,7 @@ impl Page {
         };
         let control = access(arguments, interrupt)?;
         let with_token = if control.is_some() {
-            "; with #token=TOKEN at its end, the run can be paused, cancelled and stopped there"
+            "; append #token=TOKEN to pause, cancel and stop the run there"
         } else {
             ""
         };

@@ -28,9 +28,10 @@ pub(super) fn run(path: &Path, as_json: bool, output: &mut Output) -> Answer {
     if spec.has_plan && stored.has_refused_plan() {
         return Err(Failure::new(
             format!(
-                "{name} cannot be replayed: the plan of this run was refused, and a trace has no refused plan"
+                "{name} cannot be replayed: the plan of this run was rejected, and a trace does \
+                 not contain a rejected plan"
             ),
-            "nothing was executed; `elbowroom run` with the same plan says why again",
+            "no action was executed; `elbowroom run` with the same plan reports the reason",
         ));
     }
     let task = Arc::new(super::task(&spec, output)?);
@@ -79,16 +80,16 @@ pub(super) fn run(path: &Path, as_json: bool, output: &mut Output) -> Answer {
     } else {
         output::print(&match &difference {
             None => format!(
-                "{}: {name} comes to the same decisions ({agreed} entries{})\n",
+                "{}: the replay of {name} makes the same decisions ({agreed} entries{})\n",
                 styled(SUCCESS, "agrees"),
                 if stored.is_complete() {
                     ""
                 } else {
-                    "; the run was cut short"
+                    "; the trace is incomplete"
                 }
             ),
             Some(difference) => format!(
-                "{}: {name} differs at line {}\n  stored    {}\n  replayed  {}\n",
+                "{}: the replay of {name} differs at line {}\n  stored    {}\n  replayed  {}\n",
                 styled(ERROR, "differs"),
                 difference.line,
                 difference.stored.text(),

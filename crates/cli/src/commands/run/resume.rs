@@ -26,8 +26,8 @@ fn journaled_run(path: &Path) -> Result<JournaledRun, Failure> {
     // Opening a named pipe could block forever.
     if std::fs::metadata(path).is_ok_and(|it| !it.is_file()) {
         return Err(Failure::new(
-            format!("{} is no file", path.display()),
-            "name the file that --journal has written",
+            format!("{} is not a file", path.display()),
+            "give the file that --journal has written",
         ));
     }
     let length = std::fs::metadata(path).map_or(0, |it| it.len());
@@ -83,13 +83,13 @@ impl ResumeHost for StandaloneHost<'_> {
     ) -> Result<OperatorInterface, Error> {
         if spec.is_persistent {
             return Err(Error::new(
-                "this is the journal of an executive that takes requests",
+                "this is the journal of an executive (`elbowroom serve`)",
                 "continue with `elbowroom serve --resume`",
             ));
         }
         if spec.is_interactive && self.arguments.token.is_none() {
             return Err(Error::new(
-                "this run can be paused from its page, and may be",
+                "the run may be paused, and can then only be resumed from its page",
                 "give --serve and --token again",
             ));
         }

@@ -79,7 +79,7 @@ pub(in crate::commands) fn of(
     let mut worlds = Vec::new();
     if arguments.has_adversary() {
         if spec.realtime.is_some() && spec.has_plan {
-            let what = "--world spoiler has no wall clock";
+            let what = "--world spoiler cannot run on a wall clock";
             return Err(Failure::new(what, "leave out --realtime"));
         }
         let inside = arguments.spoil.clone();
@@ -119,7 +119,7 @@ fn read_believed_world(path: &Path, learn: Option<&Path>) -> Result<Source, Fail
         return input::source(&model, "world");
     }
     output::warn(&format!(
-        "{} has no model yet: all is believed to go as planned",
+        "{} has no model yet: everything is assumed to go as planned",
         path.display()
     ));
     Ok(Source::new(
@@ -144,7 +144,7 @@ pub(super) fn fit_model(
     if left_out > 0 {
         let sections = count_with_noun(left_out, "section");
         output::warn(&format!(
-            "{path}: {sections} left out, as this problem has none of it"
+            "{path}: {sections} ignored, not applicable to this problem"
         ));
     }
     let source = Source::new(path, model.as_str());
@@ -189,14 +189,14 @@ pub(in crate::commands) fn contradiction_failure(error: SpecError) -> Failure {
                 .with_default_advice("docs/formats/likelihoods.md describes likelihood files");
         }
         SpecError::Planner(_) => {
-            "`elbowroom plan --help` says more; `embedded` is always there, and `none` plans \
-             nothing"
+            "`elbowroom plan --help` lists the planners; `embedded` is always available, and \
+             `none` disables planning"
         }
-        SpecError::UnsupportedFeature(_) => "`elbowroom check` judges plans of such a domain",
+        SpecError::UnsupportedFeature(_) => "`elbowroom check` validates plans of such a domain",
         SpecError::NeedsWorld(_) => {
             "give it a world file with --world or --believed, or name another executor"
         }
-        SpecError::NeedsEmbedded(_) => "leave out --planner, or the number",
+        SpecError::NeedsEmbedded(_) => "leave out --planner, or the number in the executor's name",
         SpecError::SelfOverlap(_) => "leave out --self-overlap, or --planner",
         SpecError::FirstPlan(why) => match why {
             FirstPlanError::Given => "leave out the plan, or --first-plan",
@@ -207,7 +207,7 @@ pub(in crate::commands) fn contradiction_failure(error: SpecError) -> Failure {
         },
         SpecError::NoTimeLimit(name) => {
             return Failure::new(
-                format!("--planner-time says nothing to `--planner {name}`"),
+                format!("--planner-time has no effect with `--planner {name}`"),
                 "leave it out, or name another planner; the embedded one is limited by \
                  --planning-budget",
             );
@@ -220,10 +220,9 @@ pub(in crate::commands) fn contradiction_failure(error: SpecError) -> Failure {
 
 fn adversary_failure(error: &AdversaryError) -> Failure {
     match error {
-        AdversaryError::NoPlan => Failure::new(
-            "there is no plan for --world spoiler to spoil",
-            "give one with --plan",
-        ),
+        AdversaryError::NoPlan => {
+            Failure::new("--world spoiler needs a plan", "give one with --plan")
+        }
         AdversaryError::Box(message) => Failure::new(format!("--spoil: {message}"), ""),
         AdversaryError::NoEnvelope => Failure::new(error, "give a box with --spoil"),
         AdversaryError::Empty => Failure::new(error, "give a smaller box with --spoil"),

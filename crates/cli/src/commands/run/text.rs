@@ -24,7 +24,7 @@ pub(super) struct RunEnd {
 pub(super) fn render(answer: &RunAnswer, report: &Report, ends: RunEnd) -> String {
     let mut replans = count_with_noun(report.replans, "new plan");
     if ends.is_persistent {
-        replans.push_str(" since it last rested");
+        replans.push_str(" since it was last idle");
     }
     let time = nearest(&report.time);
     let width = TextLayout::of_stdout().width;
@@ -54,12 +54,12 @@ pub(super) fn render(answer: &RunAnswer, report: &Report, ends: RunEnd) -> Strin
             }
         }
         Verdict::ReplanLimit => format!(
-            "{}: stopped at {time}, after {replans}; --max-replans allows no more\n",
+            "{}: stopped at {time}, after {replans}, the most that --max-replans allows\n",
             styled(HINT, "limit")
         ),
         Verdict::TimeLimit => {
             format!(
-                "{}: the time was up at {time}, after {replans}\n",
+                "{}: time limit reached at {time}, after {replans}\n",
                 styled(HINT, "limit")
             )
         }
@@ -71,7 +71,7 @@ pub(super) fn render(answer: &RunAnswer, report: &Report, ends: RunEnd) -> Strin
         }
         Verdict::Interrupted => {
             format!(
-                "{}: asked to end at {time}, after {replans}\n",
+                "{}: stopped on request at {time}, after {replans}\n",
                 styled(HINT, "interrupted")
             )
         }
@@ -91,7 +91,7 @@ pub(super) fn render(answer: &RunAnswer, report: &Report, ends: RunEnd) -> Strin
     }
     if let Some(why) = &answer.no_table {
         let what = format!(
-            "{}; moves are tried out in samples of the world instead",
+            "{}; moves are evaluated with samples of the world instead",
             escape_control(why)
         );
         let words = wrap(&what, width, 2);
@@ -121,7 +121,7 @@ pub(super) fn render(answer: &RunAnswer, report: &Report, ends: RunEnd) -> Strin
 /// Appends the executed actions.
 fn push_executed(text: &mut String, report: &Report) {
     if !report.executed.is_empty() {
-        let _ = writeln!(text, "\n{}", styled(EMPHASIS, "What was done"));
+        let _ = writeln!(text, "\n{}", styled(EMPHASIS, "Executed actions"));
     }
     for executed in &report.executed {
         let step = &executed.step;

@@ -30,7 +30,7 @@ impl TraceFile {
                         "cannot write the trace {name}: {}",
                         io_error_message(&error)
                     ),
-                    "choose a file in a folder that exists and that you may write to",
+                    "choose a file in an existing, writable folder",
                 )
             })?;
             Ok((file, name))

@@ -43,7 +43,9 @@ impl<'a> Viewers<'a> {
         let buffer = TraceBuffer::default();
         let mut header = |line: &str| buffer.add(line);
         let written = TraceWriter::new(Arc::clone(task), &mut header).header(spec);
-        written.map_err(|error| Error::new(format!("cannot show the run: {error}"), ""))?;
+        written.map_err(|error| {
+            Error::new(format!("cannot write the run for viewers: {error}"), "")
+        })?;
         let buffer = Some(buffer);
         Ok(Self { arguments, buffer })
     }

@@ -27,18 +27,18 @@ pub(super) fn run(arguments: &VerifyArgs, source: &Source, output: &mut Output) 
     let certificate = certificate_of(source.text()).map_err(|error| {
         let advice = match error {
             NoPlanAnswerError::NotDenied => {
-                "only that no plan exists has to be proved; `elbowroom check` judges a plan"
+                "this answer contains a plan, which `elbowroom check` validates"
             }
             NoPlanAnswerError::Uncertified(_) => {
-                "docs/formats/no-plan.md says for which proofs there are certificates"
+                "docs/formats/no-plan.md lists the proofs with certificates"
             }
-            _ => "`elbowroom plan DOMAIN PROBLEM --json` makes one",
+            _ => "`elbowroom plan DOMAIN PROBLEM --json` prints one",
         };
         Failure::new(error, advice)
     })?;
     if arguments.plan.is_some() {
         return Err(Failure::new(
-            "PLAN is for answers about a box, and this one says that no plan exists",
+            "PLAN applies to answers about a box, but this answer is that no plan exists",
             "leave it out",
         ));
     }
@@ -105,7 +105,7 @@ fn reason_text(certificate: &NoPlan) -> String {
                 .map(|own| own.together.len() + own.started.len() + own.meanwhile.len())
                 .sum::<usize>();
             format!(
-                "what its goal needs is never true together, as follows from {}.",
+                "facts that its goal needs are never true together, which follows from {}.",
                 count_with_noun(pairs, "bound")
             )
         }
@@ -113,15 +113,15 @@ fn reason_text(certificate: &NoPlan) -> String {
             let closed = certificate.closed.as_ref();
             let states = closed.map_or(0, |closed| closed.states.len());
             format!(
-                "whatever happens leads into one of {}, and its goal holds in none.",
+                "every execution stays within {}, and its goal holds in none of them.",
                 count_with_noun(states, "state")
             )
         }
         Kind::Reached => {
             let facts: usize = certificate.reached.iter().map(|own| own.facts.len()).sum();
             format!(
-                "even if nothing that has become true were ever lost, only {facts} facts could become \
-                 true, and the goal is not among what they allow."
+                "even if no fact ever became false, only {facts} facts could become true, and the \
+                 goal does not hold with these."
             )
         }
     }

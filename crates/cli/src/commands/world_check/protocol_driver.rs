@@ -292,7 +292,7 @@ impl ProtocolDriver {
 
     fn report_death(&mut self) -> WorldLost {
         let why = match wait_for_exit(&mut self.child, EXIT_TIMEOUT) {
-            Some(status) => format!("it has ended by itself ({status})"),
+            Some(status) => format!("the process ended unexpectedly ({status})"),
             None => "it has closed its standard input or output".to_owned(),
         };
         self.findings.record_violation(Check::KeepsRunning, why);
@@ -310,12 +310,12 @@ impl ProtocolDriver {
             let line = match self.reader.read(left) {
                 ReadResult::Line(line) => line,
                 ReadResult::LineTooLong => {
-                    let why = "a line has more than a megabyte; one message a line";
+                    let why = "a line is longer than 1 MB; expected one message per line";
                     self.findings.record_violation(Check::SpeaksProtocol, why);
                     return Err(WorldLost);
                 }
                 ReadResult::AnswerTooLong => {
-                    let why = "it says more than 16 MB without being asked";
+                    let why = "it sent more than 16 MB without a request";
                     self.findings.record_violation(Check::Answers, why);
                     return Err(WorldLost);
                 }
@@ -367,7 +367,7 @@ impl ProtocolDriver {
         self.findings.mark_done(Check::KeepsTime);
         let (was, is) = (self.now.to_f64(), now.to_f64());
         if now < self.now {
-            let why = format!("after {was} came {is}");
+            let why = format!("its time went back from {was} to {is}");
             self.findings.record_violation(Check::KeepsTime, why);
             return;
         }
@@ -377,7 +377,7 @@ impl ProtocolDriver {
             let late = &now - &allowed;
             if is_silent && late > Rational::from(5) {
                 let why = format!(
-                    "asked to wait until {}, it waited until {is}",
+                    "requested to wait until {}, it waited until {is}",
                     until.to_f64()
                 );
                 self.findings.record_violation(Check::KeepsTime, why);
@@ -404,10 +404,10 @@ impl ProtocolDriver {
             let (is, now) = (time.to_f64(), self.now.to_f64());
             let is_old = *time < before - &Rational::ONE;
             if *time > self.now {
-                let why = format!("{name}: a report of {is} came at {now}, before its time");
+                let why = format!("{name}: a report with time {is} arrived too early, at {now}");
                 wrong(Check::ReportsInTime, why);
             } else if is_old && !self.is_recalling {
-                let why = format!("{name}: a report of {is} came at {now}");
+                let why = format!("{name}: a report with time {is} arrived too late, at {now}");
                 wrong(Check::ReportsInTime, why);
             }
             match event {
@@ -463,7 +463,7 @@ impl ProtocolDriver {
         if !ended {
             let _ = self.child.kill();
             let _ = self.child.wait();
-            let why = "it was still there a second later, and was killed";
+            let why = "it was still running a second after `stop`, and was killed";
             self.findings.record_violation(Check::Stops, why);
         } else if matches!(told, WriteResult::Written) {
             self.findings.mark_done(Check::KeepsRunning);

@@ -42,7 +42,7 @@ pub(super) fn check_restart(
     let program = match launch(command) {
         Ok(program) => program,
         Err(why) => {
-            let why = format!("it cannot be started again: {why}");
+            let why = format!("it cannot be restarted: {why}");
             rest.findings.record_violation(Check::Resumes, why);
             return Err(rest.findings);
         }
@@ -71,17 +71,19 @@ fn check_recalled(
     player.recall(&[ENDED_TICKET, RUNNING_TICKET, UNKNOWN_TICKET])?;
     player.findings.mark_done(Check::Resumes);
     if !player.can(Capability::Resume) {
-        let why = "started again, it does not claim `resume` any more";
+        let why = "it no longer claims `resume` after the restart";
         player.findings.record_violation(Check::Resumes, why);
     }
     if !player.has_ended(ENDED_TICKET) {
         let why = if player.is_unknown(ENDED_TICKET) {
             format!(
-                "it had reported the end of start {ENDED_TICKET}, and knows nothing of it when it is started again"
+                "it had reported the end of start {ENDED_TICKET}, but answers `unknown` for it \
+                 after the restart"
             )
         } else {
             format!(
-                "start {ENDED_TICKET} was over, and it does not answer `ended` when asked about it again"
+                "start {ENDED_TICKET} had ended, but it does not answer `ended` for it after the \
+                 restart"
             )
         };
         player.findings.record_violation(Check::Resumes, why);
@@ -89,15 +91,17 @@ fn check_recalled(
     for ticket in [RUNNING_TICKET, UNKNOWN_TICKET] {
         if !player.has_begun(ticket) && !player.is_unknown(ticket) {
             let why = format!(
-                "asked for the outcome of start {ticket}, it answers neither `started` nor `ended` nor `unknown`"
+                "it answers neither `started` nor `ended` nor `unknown` for start {ticket} after \
+                 the restart"
             );
             player.findings.record_violation(Check::Resumes, why);
         }
     }
     if player.is_unknown(RUNNING_TICKET) {
         let why = format!(
-            "it had reported start {RUNNING_TICKET}, and knows nothing of it when it is started again; write each start down \
-             before it begins (in Python: `World(…, ledger=FILE)`), or do not claim `resume`"
+            "it had reported start {RUNNING_TICKET}, but answers `unknown` for it after the \
+             restart; record each start before it begins (in Python: `World(…, ledger=FILE)`), or \
+             do not claim `resume`"
         );
         player.findings.record_violation(Check::Resumes, why);
     }
@@ -108,7 +112,7 @@ fn check_recalled(
     })?;
     if player.is_running(RUNNING_TICKET) {
         let why = format!(
-            "start {RUNNING_TICKET} had not ended {} s after it was started again",
+            "start {RUNNING_TICKET} had not ended {} s after the restart",
             long.to_f64()
         );
         player.findings.record_violation(Check::Resumes, why);
@@ -117,7 +121,7 @@ fn check_recalled(
     let began = player.started(RUNNING_TICKET).cloned();
     if let Some(began) = began.filter(|began| began > killed) {
         let why = format!(
-            "an action that was running at {} started again at {}; no action may start twice",
+            "an action that was running at {} started a second time at {}; no action may start twice",
             killed.to_f64(),
             began.to_f64()
         );
@@ -126,7 +130,7 @@ fn check_recalled(
     if player.has_begun(UNKNOWN_TICKET) {
         let name = excerpt(player.name_of(UNKNOWN_TICKET));
         let why = format!(
-            "it never received start {UNKNOWN_TICKET}, and reports that {name} was started for it"
+            "it never received start {UNKNOWN_TICKET}, but reports that {name} was started for it"
         );
         player.findings.record_violation(Check::Resumes, why);
     }

@@ -34,17 +34,17 @@ impl Check {
         (
             Self::SpeaksProtocol,
             "speaks",
-            "each line that it says is a message of the protocol",
+            "each line that it sends is a message of the protocol",
         ),
         (
             Self::Answers,
             "answers",
-            "each question is answered in time, up to `time`",
+            "each question is answered in time, with `time` as the last message",
         ),
         (
             Self::KeepsTime,
             "keeps-time",
-            "time advances, never back, and not beyond the requested time",
+            "time never goes back, and not beyond the requested time",
         ),
         (
             Self::Starts,
@@ -56,17 +56,17 @@ impl Check {
             "starts-before-it-ends",
             "`started` comes before `ended`, and with an earlier or equal time",
         ),
-        (Self::Ends, "ends", "each started action also ends"),
+        (Self::Ends, "ends", "each started action ends"),
         (Self::EndsOnce, "ends-once", "each action ends once"),
         (
             Self::ReportsInTime,
             "reports-in-time",
-            "reports come in the answer in whose time they happened",
+            "each report arrives in the answer that covers its time",
         ),
         (
             Self::KnowsTickets,
             "knows-its-tickets",
-            "reports are about tickets that were given",
+            "reports refer only to tickets of requested starts",
         ),
         (
             Self::RunsConcurrently,
@@ -81,7 +81,7 @@ impl Check {
         (
             Self::IgnoresUnknownMessages,
             "ignores-the-unknown",
-            "unknown messages and late cancels do not disturb it",
+            "it ignores unknown messages and late cancels",
         ),
         (
             Self::AcceptsBeliefs,
@@ -91,7 +91,7 @@ impl Check {
         (
             Self::Resumes,
             "resumes",
-            "killed and started again, it knows the state of the actions that were running",
+            "after a kill and a restart, it knows the state of the actions that were running",
         ),
         (Self::Stops, "stops", "it ends within a second after `stop`"),
     ];
@@ -164,9 +164,9 @@ impl Findings {
                 (Outcome::Passed, Vec::new())
             } else {
                 let why = if self.unclaimed.contains(&check) {
-                    "it does not claim this"
+                    "the world does not claim this capability"
                 } else {
-                    end.unwrap_or("there was no occasion")
+                    end.unwrap_or("the situation did not occur")
                 };
                 (Outcome::Skipped, vec![why.to_owned()])
             };

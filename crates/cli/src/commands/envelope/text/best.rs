@@ -14,29 +14,29 @@ pub(super) fn best_relaxations(best: &Best) -> Option<String> {
         Objective::LeastSlack => {
             let percent = &worth.gain * &Rational::from(100);
             format!(
-                "{} % of least deviation",
+                "{} % to the least slack",
                 number::rounded(&percent, 2, Rounding::Down)
             )
         }
         Objective::Volume => {
             let percent = &worth.gain * &Rational::from(100);
-            format!("{} % of volume", number::nearest(&percent))
+            format!("{} % to the volume", number::nearest(&percent))
         }
         Objective::Probability => {
             let percent = &worth.gain * &Rational::from(100);
-            format!("{} % of probability", number::nearest(&percent))
+            format!("{} % to the probability", number::nearest(&percent))
         }
-        _ => format!("{} in the sum of the widths", number::nearest(&worth.gain)),
+        _ => format!("{} to the sum of the widths", number::nearest(&worth.gain)),
     };
     let named = best.worth.iter().take(MOST_NAMED).map(|worth| {
         let relax = match worth.relax {
             Relax::More => "more",
             Relax::Less => "less",
         };
-        format!("1 {relax} of {} gains {}", worth.bound, gain(worth))
+        format!("1 {relax} of {} adds {}", worth.bound, gain(worth))
     });
     let named: Vec<String> = named.collect();
-    (!named.is_empty()).then(|| format!("Bounds that are worth most: {}.", named.join("; ")))
+    (!named.is_empty()).then(|| format!("Most valuable relaxations: {}.", named.join("; ")))
 }
 
 /// Describes the volume as the geometric mean of the widths.
@@ -54,13 +54,13 @@ fn volume_text(best: &Best, parameters: &[LimitedRange]) -> String {
     let value = mean(&best.value);
     let counted = number::nearest(&best.most);
     let also = if best.is_proved {
-        "It is proved that no box has a volume that is more than a millionth greater".to_owned()
+        "Proved optimal: no box has a volume that is more than a millionth greater".to_owned()
     } else {
         format!("No box has more than {}", mean(&best.bound))
     };
     format!(
-        "The geometric mean of the widths is {value} of the nominal values, counted up to {counted} \
-         times these. {also}"
+        "The geometric mean of the widths is {value} of the nominal values, with deviations \
+         capped at {counted} times these. {also}"
     )
 }
 
@@ -71,21 +71,20 @@ fn probability_text(best: &Best, probability: &Probability) -> String {
         format!("{} %", number::rounded(&percent, 3, rounding))
     };
     if probability.most.is_zero() {
-        return "In no box is there any probability that all durations stay inside, as the world has \
-                them"
+        return "With the distributions of the world file, the probability that all durations stay \
+                inside is 0 for every box"
             .to_owned();
     }
     let least = percent(&probability.least, Rounding::Down);
     let most = percent(&probability.most, Rounding::Up);
     let also = if best.is_proved {
-        format!(
-            "It is proved that no box is more likely by more than a millionth; none has more than {most}"
-        )
+        format!("Proved optimal to within a millionth: no box has more than {most}")
     } else {
         format!("No box has more than {most}")
     };
     format!(
-        "All durations stay inside with a probability of at least {least}, as the world has them. {also}"
+        "With the distributions of the world file, all durations stay inside with a probability \
+         of at least {least}. {also}"
     )
 }
 
@@ -106,25 +105,28 @@ pub(super) fn objective_text(best: &Best, parameters: &[LimitedRange]) -> String
     };
     let value = number(&best.value);
     let what = match best.objective {
-        Objective::LeastSlack => "least deviation that any end has room for",
+        Objective::LeastSlack => "least slack of any bound",
         _ => "sum of the widths",
     };
     let counted = format!(
-        "counted up to {} times the nominal values",
+        "with deviations capped at {} times the nominal values",
         number::nearest(&best.most)
     );
     match (best.is_proved, best.objective) {
         (true, Objective::LeastSlack) => format!(
-            "The {what} is {value}, {counted}. It is proved that none can have more unless one that \
-             has no more gets less"
+            "The {what} is {value}, {counted}. Proved optimal: no bound can gain slack unless one \
+             with at most as much slack loses some"
         ),
-        (true, _) => format!("The {what} is {value}, {counted}. It is proved that no box has more"),
+        (true, _) => format!("The {what} is {value}, {counted}. Proved optimal: no box has more"),
         (false, _) if best.value < best.bound => format!(
             "The {what} is {value}, {counted}. No box has more than {}",
             number(&best.bound)
         ),
         (false, _) => {
-            format!("The {what} is {value}, {counted}. No box has more, but other ends could have")
+            format!(
+                "The {what} is {value}, {counted}. No box has more, but its other bounds \
+                 could be wider"
+            )
         }
     }
 }

@@ -17,7 +17,7 @@ pub(super) fn reason_text(explanation: &Explanation) -> String {
     let is_said = explanation.verdict.is_some();
     match &explanation.shortfall {
         Some(Shortfall::Unbounded) => {
-            format!("{reason}, but nothing in the plan sees to it")
+            format!("{reason}, but nothing in the plan ensures it")
         }
         Some(Shortfall::Time(late)) if !is_said => {
             format!("{reason}: too late by {}", number::nearest(late))
@@ -44,19 +44,19 @@ pub(super) fn example(
         .map(|(parameter, value)| format!("{} = {}", parameter.name, number::nearest(value)))
         .collect();
     if !values.is_empty() {
-        let _ = write!(text, "\n{}\n", styled(EMPHASIS, "For example with"));
+        let _ = write!(text, "\n{}\n", styled(EMPHASIS, "Example values"));
         push_wrapped(&mut text, &values.join(", "), 2, look.width);
     }
     let Some(schedule) = &explanation.schedule else {
         return text;
     };
     let fixed = plan.plan.at(&explanation.valuation).scheduled(schedule);
-    let _ = write!(text, "\n{}\n", styled(EMPHASIS, "executed as"));
+    let _ = write!(text, "\n{}\n", styled(EMPHASIS, "Schedule"));
     for line in pddl::write_plan(task, &fixed).lines() {
         let _ = writeln!(text, "  {line}");
     }
     if let Some(verdict) = &explanation.verdict {
-        let _ = write!(text, "\n{}\n", styled(EMPHASIS, "this happens"));
+        let _ = write!(text, "\n{}\n", styled(EMPHASIS, "Result"));
         push_wrapped(&mut text, verdict, 2, look.width);
     }
     text

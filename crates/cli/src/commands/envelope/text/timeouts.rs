@@ -25,15 +25,15 @@ pub(super) fn guarantee_text(parameters: &[LimitedRange], rows: &[Row]) -> Strin
         format!("The plan works for any value in the interval{before}.")
     } else {
         format!(
-            "The plan works as long as each of these stays inside its interval{before}, whatever \
-             the others do in theirs."
+            "The plan works as long as each of these stays inside its interval{before}, \
+             independently of the others."
         )
     };
     let critical = rows.iter().filter(|row| row.is_critical()).count();
     if critical > 0 {
         let _ = write!(
             meaning,
-            " Critical (!), with less room than {} %: {critical} of {}.",
+            " Critical (!), with less than {} % slack: {critical} of {}.",
             table::CRITICAL,
             rows.len()
         );
