@@ -204,6 +204,6 @@ pub(crate) enum CtlCommand {
     Resume,
     /// End the executive; running actions are cancelled
     Stop,
-    /// Print the OpenAPI description of the interface, for client generators
+    /// Print the `OpenAPI` description of the interface, for client generators
     Openapi,
 }

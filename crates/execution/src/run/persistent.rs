@@ -34,7 +34,6 @@ use elbowroom_num::Rational;
 use super::background_search::SearchResults;
 use super::goal_selection::GoalSelection;
 use super::goals::OpenGoal;
-use super::kept_goals::Wait;
 use super::observations::Remark;
 use super::pending::PreparationFallback;
 use super::plan_start::PlanStart;

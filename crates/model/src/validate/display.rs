@@ -136,9 +136,7 @@ impl fmt::Display for ViolationKind {
                     ConditionTime::Now => write!(f, "needs {condition}")?,
                     _ => write!(f, "needs {condition} {when}")?,
                 }
-                for (position, reason) in reasons.iter().enumerate() {
-                    write!(f, "{} {reason}", if position == 0 { ":" } else { ";" })?;
-                }
+                write_reasons(f, reasons)?;
                 write_late_changes(f, too_late)
             }
             Self::Constraint {
@@ -148,10 +146,7 @@ impl fmt::Display for ViolationKind {
                 ..
             } => {
                 write!(f, "the constraint {constraint} is violated: {why}")?;
-                for (position, reason) in reasons.iter().enumerate() {
-                    write!(f, "{} {reason}", if position == 0 { ":" } else { ";" })?;
-                }
-                Ok(())
+                write_reasons(f, reasons)
             }
             Self::Interference {
                 first,
@@ -187,6 +182,14 @@ impl fmt::Display for ViolationKind {
             }
         }
     }
+}
+
+/// Writes the reasons why a condition or a constraint does not hold.
+fn write_reasons(f: &mut fmt::Formatter<'_>, reasons: &[Reason]) -> fmt::Result {
+    for (position, reason) in reasons.iter().enumerate() {
+        write!(f, "{} {reason}", if position == 0 { ":" } else { ";" })?;
+    }
+    Ok(())
 }
 
 /// Writes the happenings that make a condition true after it is read.
