@@ -2,16 +2,19 @@
 """A world for `elbowroom run … --world-process "python3 plansys2_world.py"`: the action performers of PlanSys2.
 
 Put `clients/python/elbowroom_world.py` beside this file, and start it where ROS 2 and your `plansys2_msgs` are set up.
-PlanSys2's own executor must be off: two of them would both answer. docs/plansys2.md says more.
+PlanSys2's own executor must be off: two of them would both answer. A second world of Elbowroom refuses to start;
+`--shared` allows it. docs/plansys2.md says more.
 
 `Hub` is the conversation of PlanSys2's topic `actions_hub`, without ROS, so that it can be tested anywhere; `main`
 connects it with rclpy.
 """
 
 import os
+import socket
 import sys
 import threading
 import time
+import uuid
 
 sys.path.insert(0, os.path.join(os.path.dirname(__file__), "..", "clients", "python"))
 from elbowroom_world import World  # noqa: E402
@@ -169,11 +172,52 @@ class Hub:
         self._send(kind, node, deal.action.name, list(deal.action.arguments))
 
 
+class Claim:
+    """The claim to the performers, on the topic `elbowroom/claims`. `crates/plansys2/src/claim.rs` has the rules."""
+
+    STATES = ("waiting", "new", "established")
+    PROBATION = 5.0
+
+    def __init__(self, publish, clock=time.monotonic):
+        self._publish, self._clock = publish, clock
+        self.id = uuid.uuid4().hex
+        self._name = f"process {os.getpid()} on {socket.gethostname()}"
+        self._held_since, self._last = None, None
+        self.refusal = None
+
+    def hold(self):
+        self._held_since = self._clock()
+        self.tick()
+
+    def _state(self):
+        if self._held_since is None:
+            return 0
+        return 1 if self._clock() - self._held_since < self.PROBATION else 2
+
+    def tick(self):
+        """Publishes the claim if its state has changed."""
+        if self._last != (state := self._state()):
+            self._last = state
+            self._publish(f"{self.STATES[state]} {self.id} {self._name}")
+
+    def check(self, text):
+        """Takes the claim of an executor, and sets `refusal` if it has priority."""
+        state, _, rest = text.partition(" ")
+        other_id, _, name = rest.partition(" ")
+        own = self._state()
+        if state not in self.STATES or not name or other_id == self.id or own == 2:
+            return
+        other = self.STATES.index(state)
+        if other > own or (other == own and other_id < self.id):
+            self.refusal = f"another executor, {name}, uses these performers: stop it, or allow both with --shared"
+
+
 def main():
     import rclpy
     from plansys2_msgs.msg import ActionExecution, ActionPerformerStatus
     from rclpy.executors import SingleThreadedExecutor
-    from rclpy.qos import QoSProfile, ReliabilityPolicy
+    from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+    from std_msgs.msg import String
 
     rclpy.init()
     node = rclpy.create_node("elbowroom")
@@ -187,6 +231,14 @@ def main():
     node.create_subscription(ActionExecution, "actions_hub", hub.message, qos)
     node.create_subscription(ActionPerformerStatus, "performers_status", hub.status, qos)
     node.create_timer(0.2, hub.tick)
+    latched = QoSProfile(
+        depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
+    )
+    claims = node.create_publisher(String, "elbowroom/claims", latched)
+    claim = Claim(lambda text: claims.publish(String(data=text)))
+    if "--shared" not in sys.argv[1:]:
+        node.create_subscription(String, "elbowroom/claims", lambda it: claim.check(it.data), latched)
+        node.create_timer(0.2, claim.tick)
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     spinning = threading.Thread(target=executor.spin, daemon=True)
@@ -200,18 +252,21 @@ def main():
         time.sleep(0.1)
     # Each performer publishes its status once per second.
     time.sleep(1.2)
-    print(f"performers: {', '.join(hub.performers()) or 'none'}", file=sys.stderr)
-
-    world = World("plansys2", speed=float(os.environ.get("ELBOWROOM_SPEED", "1")))
-    world.starter("*")(hub.begin)
-    world.canceller(hub.cancel)
-    world.run()
-    # Cancellations need time to reach the performers.
-    time.sleep(0.2)
+    if claim.refusal is None:
+        print(f"performers: {', '.join(hub.performers()) or 'none'}", file=sys.stderr)
+        claim.hold()
+        world = World("plansys2", speed=float(os.environ.get("ELBOWROOM_SPEED", "1")))
+        world.starter("*")(hub.begin)
+        world.canceller(hub.cancel)
+        world.run()
+        # Cancellations need time to reach the performers.
+        time.sleep(0.2)
     # In this order: Python must not end while a thread of ROS still runs.
     executor.shutdown()
     rclpy.try_shutdown()
     spinning.join(timeout=5)
+    if claim.refusal is not None:
+        sys.exit(f"error: {claim.refusal}")
 
 
 if __name__ == "__main__":

@@ -94,6 +94,19 @@ def wait_for_interfaces(connected):
         print(f"rosplan: no action interface was found within {within:g} s", file=sys.stderr)
 
 
+def running_node(name):
+    """The process of the node of this name, or None. The master also lists nodes that have crashed."""
+    from xmlrpc.client import ServerProxy
+
+    import rosgraph
+
+    try:
+        address = rosgraph.Master(name).lookupNode(name)
+        return ServerProxy(address).getPid(name)[2]
+    except (rosgraph.MasterException, OSError):
+        return None
+
+
 def main():
     import rospy
     from diagnostic_msgs.msg import KeyValue
@@ -101,6 +114,10 @@ def main():
 
     with open(sys.argv[1], encoding="utf-8") as file:
         names = parameters(file.read())
+    # ROS 1 ends a node when another one registers its name.
+    process = running_node("/elbowroom")
+    if process is not None:
+        sys.exit(f"error: another executor, process {process}, uses these action interfaces: stop it first")
     rospy.init_node("elbowroom", disable_signals=True)
     publisher = rospy.Publisher(TOPICS[0], ActionDispatch, queue_size=1000)
 

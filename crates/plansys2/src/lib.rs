@@ -11,6 +11,8 @@
 //! [`Lifecycle`], [`Progress`] and [`sub_goal`] are for the replacement of `PlanSys2`'s planner and
 //! executor.
 //!
+//! [`Claim`] keeps two executors from using the same performers.
+//!
 //! The library has no clock, no thread and no socket: time is an argument, and messages are return
 //! values. `docs/plansys2.md` has the table of events and reactions. Each row is a test, and the
 //! same scripts are played to the `Hub` of `examples/plansys2_world.py`, which must react in the
@@ -34,6 +36,7 @@ pub mod interface;
 pub mod knowledge;
 pub mod message;
 
+mod claim;
 mod discovery;
 mod goals;
 mod hub;
@@ -43,6 +46,7 @@ mod progress;
 mod tree;
 mod world;
 
+pub use claim::Claim;
 pub use discovery::PerformerDiscovery;
 pub use goals::Goals;
 pub use hub::{Action, ActionHandle, ActionUpdate, Effect, Hub};

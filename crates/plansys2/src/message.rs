@@ -57,6 +57,14 @@ pub struct ActionPerformerStatus {
     pub node_name: String,
 }
 
+/// `std_msgs/msg/String`, on the topic `elbowroom/claims`: reliable, the last one is kept for late
+/// subscribers.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Text {
+    /// The text of a [`Claim`](crate::Claim).
+    pub data: String,
+}
+
 /// `builtin_interfaces/msg/Time`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Stamp {

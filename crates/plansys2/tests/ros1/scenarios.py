@@ -11,6 +11,7 @@ import os
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 
@@ -83,14 +84,17 @@ class Stage:
 
     def play(self, files, *options, speed=1):
         self.environment["ELBOWROOM_SPEED"] = str(speed)
-        world = f"{sys.executable} {os.path.join(ROOT, 'examples', 'rosplan_world.py')} {files[0]}"
-        line = [ELBOWROOM, "run", *files, *options, "--world-process", world, "--strict-world"]
+        line = [ELBOWROOM, "run", *files, *options, "--world-process", self.world(files), "--strict-world"]
         run = self.start([*line, "--trace", self.trace_file], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         try:
             self.out, self.errors = run.communicate(timeout=PATIENCE)
         finally:
             run.kill()
             self.code = run.returncode
+
+    @staticmethod
+    def world(files):
+        return f"{sys.executable} {os.path.join(ROOT, 'examples', 'rosplan_world.py')} {files[0]}"
 
     def wait_for(self, what, holds):
         until = time.monotonic() + PATIENCE
@@ -194,6 +198,25 @@ def a_refusal_has_its_reason(stage):
     assert {it["event"] for it in stage.log() if it["interface"] == "driver2"} == {"refuses"}
 
 
+def a_second_executor_refuses(stage):
+    stage.begin({name: dict(it, lasts=5 * it["lasts"]) for name, it in DRIVERS.items()})
+    refused = []
+
+    def run_another():
+        stage.wait_for("the first start", lambda: any(it["event"] == "begins" for it in stage.log()))
+        line = [ELBOWROOM, "run", *YARD, "--world-process", stage.world(YARD)]
+        refused.append(stage.start(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE))
+
+    beside = threading.Thread(target=run_another)
+    beside.start()
+    stage.play(YARD, speed=0.2)
+    beside.join()
+    assert stage.code == 0, "the first run is not disturbed"
+    (run,) = refused
+    out, errors = run.communicate(timeout=PATIENCE)
+    assert run.returncode == 2 and "another executor, process" in errors, f"{run.returncode} {out} {errors}"
+
+
 def nobody_is_there(stage):
     stage.environment["ELBOWROOM_PERFORMERS_WITHIN"] = "2"
     stage.play(YARD, "--time-limit", "5")
@@ -207,7 +230,7 @@ BOTH = [
     a_failure_has_its_reason,
     what_is_late_has_its_reason,
 ]
-NUMBERS_ONLY = [a_refusal_has_its_reason, nobody_is_there]
+NUMBERS_ONLY = [a_refusal_has_its_reason, a_second_executor_refuses, nobody_is_there]
 
 
 def play(number, scenario, version, messages):

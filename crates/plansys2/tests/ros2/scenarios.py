@@ -13,6 +13,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 
@@ -210,6 +211,33 @@ def a_run_is_interrupted(stage):
     told = {it["action"] for it in stage.log() if it["event"] == "told to cancel"}
     assert told == {"(move r1 shed gate)", "(move r2 barn gate)"}
     assert "terminate called" not in stage.errors
+
+
+def a_second_executor_refuses(stage):
+    """The first run holds the performers until it ends, then the next one may use them."""
+    crew = {name: dict(it, lasts=5 * it["lasts"]) for name, it in DRIVERS.items()}
+    others = [PROGRAM, PYTHON_WORLD]
+    refused = []
+
+    def run_others():
+        stage.wait_for("the first start", lambda: "begins" in stage.events())
+        for world in others:
+            line = [ELBOWROOM, "run", *YARD, "--world-process", world]
+            refused.append(stage.start(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE))
+
+    beside = threading.Thread(target=run_others)
+    beside.start()
+    stage.play(crew, YARD, speed=0.2)
+    beside.join()
+    assert stage.code == 0, "the first run is not disturbed"
+    for run in refused:
+        out, errors = run.communicate(timeout=PATIENCE)
+        assert run.returncode == 2 and "another executor, process" in errors, f"{run.returncode} {out} {errors}"
+    begun = [it["action"] for it in stage.log() if it["event"] == "begins"]
+    assert len(begun) == len(set(begun)), "no action was started twice"
+    os.remove(stage.log_file)
+    stage.play(DRIVERS, YARD)
+    assert stage.code == 0, "the performers are free again"
 
 
 def the_protocol_is_kept(stage):
@@ -475,6 +503,7 @@ BOTH = [
     a_performer_never_says_that_it_has_ended,
     what_is_late_has_its_reason,
     a_run_is_interrupted,
+    a_second_executor_refuses,
     the_protocol_is_kept,
 ]
 

@@ -38,6 +38,8 @@ pub(crate) enum Input {
     Hub(ActionExecution),
     /// A message on `performers_status`.
     Status(ActionPerformerStatus),
+    /// The claim of an executor.
+    Claim(String),
     /// A warning for the user.
     Warning(String),
     /// A client calls a service.
@@ -78,7 +80,7 @@ fn world(options: Options) -> Result<(), String> {
     let settings = options.settings()?;
     let (inputs, received) = mpsc::channel();
     let mut network = Network::join(&settings)?;
-    let topics = Topics::join(&mut network)?;
+    let topics = Topics::join(&mut network, settings.is_shared)?;
     let follows = settings.problem_expert == Some(ProblemExpert::Follow);
     let expert = follows.then(|| Expert::join(&mut network)).transpose()?;
     network.listen(inputs.clone())?;
@@ -91,7 +93,7 @@ fn serve(options: Options, serving: ServeOptions) -> Result<(), String> {
     let settings = options.settings()?;
     let (inputs, received) = mpsc::channel();
     let mut network = Network::join(&settings)?;
-    let topics = Topics::join(&mut network)?;
+    let topics = Topics::join(&mut network, settings.is_shared)?;
     let services = Services::offer(&mut network)?;
     let follows = settings.problem_expert != Some(ProblemExpert::Ignore);
     let expert = follows.then(|| Expert::join(&mut network)).transpose()?;
@@ -106,8 +108,7 @@ fn serve(options: Options, serving: ServeOptions) -> Result<(), String> {
         services,
         expert,
     };
-    serve::Server::new(&settings, serving, sides, inputs).run(&received);
-    Ok(())
+    serve::Server::new(&settings, serving, sides, inputs).run(&received)
 }
 
 fn read(inputs: &Sender<Input>) {

@@ -93,6 +93,12 @@ impl Network {
         })
     }
 
+    /// Returns the GUID of the participant, which is unique in the domain, as hexadecimal digits.
+    pub(super) fn id(&self) -> String {
+        let bytes = self.participant.guid().to_bytes();
+        bytes.iter().map(|it| format!("{it:02x}")).collect()
+    }
+
     /// Creates the topic of that name in the namespace. `kind` is its type, as in
     /// `plansys2_msgs::msg::dds_::Plan_`.
     fn topic(

@@ -12,8 +12,8 @@ const ABOUT: &str = "A world for `elbowroom run … --world-process elbowroom-pl
                      performers of PlanSys2, over DDS and without ROS.
 
 PlanSys2's own executor \
-                     must be off: otherwise both executors would choose performers. \
-                     docs/plansys2.md describes the sequence.";
+                     must be off: otherwise both executors would choose performers. A second \
+                     elbowroom-plansys2 refuses. docs/plansys2.md describes the sequence.";
 
 /// Command line of the program.
 #[derive(Debug, Parser)]
@@ -126,6 +126,10 @@ pub(super) struct NetworkOptions {
         help = "Whether changes by a run are reported to PlanSys2's problem expert, and changes by others there to the run [default: follow for `serve`, else ignore]"
     )]
     problem_expert: Option<ProblemExpert>,
+    /// Allow other executors to use the same performers. Each performer must then belong to one
+    /// executor
+    #[arg(long, global = true)]
+    shared: bool,
 }
 
 /// Use of the problem expert.
@@ -149,6 +153,8 @@ pub(super) struct Settings {
     pub(super) interfaces: Vec<IpAddr>,
     /// The option as given; its default depends on the subcommand.
     pub(super) problem_expert: Option<ProblemExpert>,
+    /// `true` if other executors may use the same performers.
+    pub(super) is_shared: bool,
 }
 
 impl Options {
@@ -180,6 +186,7 @@ impl Options {
             namespace: namespace(&network.namespace)?,
             interfaces,
             problem_expert: network.problem_expert,
+            is_shared: network.shared,
         })
     }
 }

@@ -123,22 +123,30 @@ impl Server {
     }
 
     /// Serves until the user asks the program to end.
-    pub(super) fn run(mut self, received: &Receiver<Input>) {
+    ///
+    /// # Errors
+    /// Another executor uses the performers.
+    pub(super) fn run(mut self, received: &Receiver<Input>) -> Result<(), String> {
         warn("serves planner/get_plan and execute_plan");
+        self.topics.hold_claim(self.now());
         let mut leaves: Option<Duration> = None;
+        let mut refusal = Ok(());
         loop {
+            self.topics.publish_claim(self.now());
             let due = self
                 .execution
                 .as_ref()
                 .and_then(|it| it.world.due_in(self.now()));
-            // The sender is kept, so the only possible error is a time-out.
-            if let Ok(input) = received.recv_timeout(due.map_or(TICK, |it| it.min(TICK))) {
-                if matches!(input, Input::Stop) {
-                    leaves.get_or_insert(self.now());
-                    self.interrupt();
-                } else {
-                    self.handle_input(input);
-                }
+            // The only possible error is a time-out, because the sender is kept.
+            let input = received.recv_timeout(due.map_or(TICK, |it| it.min(TICK)));
+            if let Ok(Input::Claim(text)) = &input {
+                refusal = refusal.and(self.topics.check_claim(text, self.now()));
+            }
+            if refusal.is_err() || matches!(input, Ok(Input::Stop)) {
+                leaves.get_or_insert(self.now());
+                self.interrupt();
+            } else if let Ok(input) = input {
+                self.handle_input(input);
             }
             self.hub.tick(self.now());
             warn_on_error(self.services.flush());
@@ -148,7 +156,7 @@ impl Server {
                 // Cancel messages are delivered and planners killed before the program ends.
                 self.is_over.store(true, Ordering::Relaxed);
                 thread::sleep(TICK);
-                return;
+                return refusal;
             }
         }
     }
@@ -190,7 +198,7 @@ impl Server {
                     execution.is_silent = true;
                 }
             }
-            Input::Stop => {}
+            Input::Claim(_) | Input::Stop => {}
         }
     }
 

@@ -27,6 +27,8 @@ pub(super) struct Session {
     hub: Hub,
     world: World,
     census: PerformerDiscovery,
+    /// Reason to end, if another executor uses the performers.
+    refusal: Option<String>,
     zero: Instant,
 }
 
@@ -51,6 +53,7 @@ impl Session {
             hub: Hub::new("elbowroom"),
             world,
             census: PerformerDiscovery::new(settings.needs.clone(), settings.within),
+            refusal: None,
             zero: now(),
         }
     }
@@ -58,15 +61,17 @@ impl Session {
     /// Runs until Elbowroom says stop or closes the connection.
     ///
     /// # Errors
-    /// A performer is missing; the text names it.
+    /// A performer is missing, or another executor uses the performers; the text names it.
     pub(super) fn run(mut self) -> Result<(), String> {
         let said = self.wait_for_performers()?;
         warn(&format!("performers: {}", self.hub.listed(self.now())));
+        self.topics.hold_claim(self.now());
         if !said.into_iter().any(|input| self.handle_input(input)) {
             self.run_loop();
         }
+        let refusal = self.refusal.take();
         self.shut_down();
-        Ok(())
+        refusal.map_or(Ok(()), Err)
     }
 
     fn run_loop(&mut self) {
@@ -97,6 +102,7 @@ impl Session {
             match self.inputs.recv_timeout(TICK) {
                 Ok(Input::Status(status)) => self.hub.status(&status, self.now()),
                 Ok(Input::Hub(message)) => self.hub.message(&message, self.now()),
+                Ok(Input::Claim(text)) => self.topics.check_claim(&text, self.now())?,
                 Ok(Input::Warning(text)) => warn(&text),
                 Ok(Input::Closed) => {
                     said.push(Input::Closed);
@@ -149,6 +155,10 @@ impl Session {
             Input::Hub(message) => self.hub.message(&message, now),
             Input::Status(status) => self.hub.status(&status, now),
             Input::Expert(heard) => self.handle_expert_message(heard),
+            Input::Claim(text) => {
+                self.refusal = self.topics.check_claim(&text, now).err();
+                return self.refusal.is_some();
+            }
             Input::Warning(text) => warn(&text),
             // The other inputs belong to `serve`.
             _ => {}
@@ -165,6 +175,7 @@ impl Session {
     /// Applies the effects of the hub, and answers if an answer is due.
     fn settle(&mut self) {
         let now = self.now();
+        self.topics.publish_claim(now);
         for effect in self.hub.effects() {
             match effect {
                 Effect::Send(message) => {
