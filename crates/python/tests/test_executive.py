@@ -272,6 +272,20 @@ def test_two_executives_run_at_once(tmp_path: Path) -> None:
             assert executive.wait(executive.submit(HOME), HANG)
 
 
+def test_second_run_of_a_world_is_refused() -> None:
+    world = Depot()
+    with Executive(*CASE, world=world) as first:
+        assert first.wait("problem", HANG)
+        with pytest.raises(elbowroom.WorldError, match="another run uses this world"):
+            elbowroom.read(*CASE).run(world=world)
+        with pytest.raises(elbowroom.WorldError, match="another run uses this world"):
+            Executive(*CASE, world=world).stop()
+        assert world.stops == 0, "the world is left to the first one"
+        assert first.wait(first.submit(HOME), HANG)
+    assert world.stops == 1
+    assert elbowroom.read(*CASE).run(world=Depot()).verdict == "goal-reached"
+
+
 @pytest.mark.parametrize("kind", ["well", "blocks", "ignores"])
 @pytest.mark.parametrize("name", ["World", "SteppedWorld"])
 @pytest.mark.filterwarnings("ignore::elbowroom.InterruptedWarning")

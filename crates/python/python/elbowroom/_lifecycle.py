@@ -21,7 +21,7 @@ from typing import Any
 
 from ._calls import WorldLoop, WorldThread
 from ._clock import ClockCheck, Overdue
-from ._errors import ClockWarning
+from ._errors import ClockWarning, RequestError
 from ._world import Action, Observation, ended, passage, wire
 
 GRACE = 5.0
@@ -41,6 +41,12 @@ POLL_INTERVAL = 0.1
 """Longest time until a signal is noticed, in seconds."""
 
 
+_worlds_in_use: set[int] = set()
+"""Identities of the worlds of current runs."""
+
+_worlds_lock = threading.Lock()
+
+
 class Blocked(Exception):
     """The world has not answered within the grace period."""
 
@@ -58,8 +64,11 @@ class Lifecycle:
         submit: WorldThread | WorldLoop,
         request_stop: Callable[[], None],
         time_limit: float | None = None,
+        owner: object = None,
     ) -> None:
+        """``owner`` is the user's world, if ``world`` adapts it."""
         self._world = world
+        self._owner = world if owner is None else owner
         self._submit = submit
         self._request_stop = request_stop
         self._time_limit = None if time_limit is None else time.monotonic() + time_limit
@@ -84,6 +93,8 @@ class Lifecycle:
         self._callables = 0
         self.clock = ClockCheck()
         self.is_begun = False
+        # Another run uses the world.
+        self._is_refused = False
         self.is_ended_early = False
 
     # Requests from outside.
@@ -199,8 +210,8 @@ class Lifecycle:
     def cancel(self, now: str, ticket: int) -> None:
         self._now = now
         action = self._actions.get(ticket)
-        if action is None:
-            # The world failed before it received this start.
+        if action is None or self._is_refused:
+            # The world did not receive this start.
             why = "the world failed before it was started"
             self._unstarted.append(ended(ticket, Fraction(now), "cancelled", why))
         elif ticket not in self._cancelled:
@@ -264,6 +275,9 @@ class Lifecycle:
         begun = time.monotonic()
         self._is_closing = True
         self._ends_since = begun if since is None else since
+        if self._is_refused:
+            self._submit.close()
+            return None
         for ticket in [*self._open]:
             self.cancel(self._now, ticket)
         stop = getattr(self._world, "stop", None)
@@ -277,6 +291,9 @@ class Lifecycle:
         for future in self._unfinished:
             future.cancel()
         self._submit.close()
+        if self.is_begun:
+            with _worlds_lock:
+                _worlds_in_use.discard(id(self._owner))
         return self._failure
 
     @property
@@ -287,12 +304,26 @@ class Lifecycle:
     # Helpers.
 
     def _begin(self, method: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        self.is_begun = True
+        if not self.is_begun:
+            self._claim_world()
+            self.is_begun = True
         future = self._submit(method, *arguments)
         future.add_done_callback(lambda _: self._inbox.put(None))
         self._unfinished = [it for it in self._unfinished if not it.done()]
         self._unfinished.append(future)
         return future
+
+    def _claim_world(self) -> None:
+        with _worlds_lock:
+            self._is_refused |= id(self._owner) in _worlds_in_use
+            if not self._is_refused:
+                _worlds_in_use.add(id(self._owner))
+                return
+        self.begin_end()
+        raise RequestError(
+            "another run uses this world: the two would take each other's observations; "
+            "give each run a world of its own, or wait for the end of the other run"
+        )
 
     def _call(self, method: Callable[..., Any], *arguments: Any) -> Any:
         """Returns the answer of a method, or ``None`` if the run is to end and the method still runs."""

@@ -69,9 +69,10 @@ def world_lifecycle(
     is_in_loop = isinstance(world, AsyncWorld) or has_coroutines(world)
     submit = WorldLoop(loop) if loop is not None and is_in_loop else WorldThread()
     lifecycle: Lifecycle | None = None
+    owner = world
     if isinstance(world, SteppedWorld):
         world = SteppedAdapter(world, lambda: lifecycle is not None and lifecycle.is_ending)
-    lifecycle = Lifecycle(world, submit, request_stop, limit)
+    lifecycle = Lifecycle(world, submit, request_stop, limit, owner)
     return lifecycle
 
 
