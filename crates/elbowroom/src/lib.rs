@@ -130,8 +130,6 @@
 //!   SMT-LIB.
 //! - [`no_plan`]: certificates that no plan exists.
 //! - [`dot`]: networks as graphs for Graphviz.
-//! - [`timed`]: what the best of all executors could reach on a clock, and the policy that reaches
-//!   it.
 //! - [`Explainer`]: explains what limits an envelope, and why a plan fails ([`Explanation`],
 //!   [`Shortfall`]).
 //! - [`parse_box`], [`write_box`]: boxes as text ([`BoxTextError`]).
@@ -150,6 +148,7 @@
 //! - [`plan`]: networks of plans, and their parameters.
 //! - [`envelope`]: decides whether a box is inside the envelope, and searches for a large one.
 //! - [`probability`]: success probabilities, and the best order of a plan's actions.
+//! - [`mdp`]: bounds on the success probability of the best executor on a clock, and its policy.
 //! - [`planner`]: the embedded planner; [`external`]: other planners, as supervised processes.
 //! - [`execution`]: executors, and the run of a plan.
 //! - [`sim`]: simulated worlds.
@@ -177,7 +176,6 @@ pub mod pipeline;
 mod plan_file;
 mod plan_text;
 mod rounding;
-pub mod timed;
 
 pub use box_text::{BoxTextError, parse_box, write_box};
 pub use duration_distributions::{
@@ -187,6 +185,7 @@ pub use elbowroom_envelope as envelope;
 pub use elbowroom_execution as execution;
 pub use elbowroom_external as external;
 pub use elbowroom_learning as learning;
+pub use elbowroom_mdp as mdp;
 pub use elbowroom_model as model;
 pub use elbowroom_num as num;
 pub use elbowroom_pddl as pddl;

@@ -35,6 +35,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("execution", &["num", "model", "stn", "plan", "probability"]),
     ("sim", &["text", "num", "model", "probability", "execution"]),
     ("report", &["num", "model", "plan", "execution"]),
+    ("mdp", &["num", "model", "execution", "sim"]),
     ("learning", &["text", "num", "sim", "report"]),
     // Time zones, used only by the command.
     ("calendar", &["text", "num", "model", "pddl"]),
@@ -56,6 +57,7 @@ const LAYERS: &[(&str, &[&str])] = &[
             "sim",
             "report",
             "learning",
+            "mdp",
             "verify",
         ],
     ),

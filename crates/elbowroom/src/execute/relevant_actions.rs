@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use elbowroom_execution::executors::ExecutorSpec;
 use elbowroom_execution::run::{PlanningTime, RunSettings};
+use elbowroom_mdp::Settings;
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 use elbowroom_sim::WorldModel;
@@ -11,7 +12,6 @@ use indexmap::IndexMap;
 
 use super::{Candidates, Embedded, Limits, Replanning, RolloutSession, Rollouts};
 use crate::pipeline;
-use crate::timed::{self, Settings};
 
 /// Maximum number of plans.
 const MOST_PLANS: usize = 8;
@@ -39,7 +39,7 @@ pub struct ActionSets {
 }
 
 impl ActionSets {
-    /// Computes the sets for bounds on the success probability ([`timed`]).
+    /// Computes the sets for bounds on the success probability ([`elbowroom_mdp`]).
     pub fn new(
         task: &Task,
         world: &WorldModel,
@@ -49,7 +49,7 @@ impl ActionSets {
         Self::of(task, world, embedded, &|_| true, goes_on)
     }
 
-    /// Computes the sets for a [policy](timed::Policy); empty if there would be no table even for
+    /// Computes the sets for a [policy](elbowroom_mdp::Policy); empty if there would be no table even for
     /// the first set.
     pub fn for_policy(
         task: &Task,
@@ -62,7 +62,7 @@ impl ActionSets {
                 only: Some(first.to_vec()),
                 ..Settings::default()
             };
-            timed::is_supported(task, world, &settings)
+            elbowroom_mdp::is_supported(task, world, &settings)
         };
         Self::of(task, world, embedded, &is_of_use, goes_on)
     }
@@ -98,7 +98,7 @@ impl ActionSets {
         let others = std::iter::from_fn(next).take(MOST_PLANS - 1);
         let mut plans = vec![names(&first)];
         plans.extend(others.map(|plan| names(&plan)));
-        let fallbacks = if timed::has_known_times(task, world) {
+        let fallbacks = if elbowroom_mdp::has_known_times(task, world) {
             fallbacks(&thought, world, replanning, &first, goes_on)
         } else {
             Vec::new()
@@ -142,7 +142,7 @@ fn fallbacks(
             let own = names(&plan);
             // A plan without new actions only continues the earlier plans.
             if own.iter().any(|name| !before.contains(name))
-                && let Ok(mut set) = timed::supported(task, world, &own, &before)
+                && let Ok(mut set) = elbowroom_mdp::supported(task, world, &own, &before)
             {
                 set.sort_unstable();
                 set.dedup();

@@ -14,11 +14,10 @@ mod formula;
 mod timed;
 mod untimed;
 
+use elbowroom_mdp::NotTabulated;
 use elbowroom_probability::Unsupported;
 use elbowroom_probability::likelihoods::Missing;
 use elbowroom_probability::optimum::TabulationError;
-
-use crate::timed::NotTabulated;
 
 pub use timed::{Bound, timed};
 pub use untimed::untimed;

@@ -10,6 +10,7 @@ use elbowroom_execution::{
     ActionValues, NoPlanner, PlanComparator, PlanForm, Planner, PrepareError, Preparer, World,
 };
 use elbowroom_external::{self as external, PlannerError};
+use elbowroom_mdp::{Policy, Settings};
 use elbowroom_model::problem::Problem;
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::{Rational, work};
@@ -25,7 +26,6 @@ use crate::execute::{
     PlanPreparer, PlanSelector, Replanning, RolloutPolicy, Rollouts, SelectingPlanner,
     SharedRolloutPolicy, WorldKnowledge, planning_work,
 };
-use crate::timed::{Policy, Settings};
 use crate::{BoxTextError, DistributionError, parse_box, pipeline};
 
 /// The time limit of another planner for its first plan.

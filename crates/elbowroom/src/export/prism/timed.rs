@@ -4,16 +4,16 @@ mod modules;
 
 use std::fmt::Write as _;
 
+use elbowroom_mdp::Settings;
+use elbowroom_mdp::process::{
+    ActionModel, CellProbabilities, Event, Facts, Needs, Side, TimedWorld, cell_probabilities_of,
+};
 use elbowroom_model::Task;
 use elbowroom_sim::WorldModel;
 
 use super::formula::Formula;
 use super::{PrismError, bare, checked};
 use crate::export::names::distinct;
-use crate::timed::{
-    ActionModel, CellProbabilities, Event, Facts, Needs, Settings, Side, TimedWorld,
-    cell_probabilities_of,
-};
 
 /// Direction of the bound on the best value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,13 +25,13 @@ pub enum Bound {
     Upper,
 }
 
-/// Returns the process of the timed optimum ([`crate::timed`]) on a grid of `cells` cells, in the
+/// Returns the process of the timed optimum ([`elbowroom_mdp`]) on a grid of `cells` cells, in the
 /// language of PRISM. Its `Pmax=? [F "goal"]`, or, for the lower bound, `<<agent>> Pmax=? [F
 /// "goal"]`, is a bound on the success probability of the best executor without foresight.
 ///
-/// It has none of the shortcuts of [`optimum`](crate::timed::optimum): any action may be started or
+/// It has none of the shortcuts of [`optimum`](elbowroom_mdp::optimum): any action may be started or
 /// cancelled whenever the state allows, in any order. So the upper bound is the same. The lower
-/// bound is at least as great, because [`optimum`](crate::timed::optimum) sometimes assumes less
+/// bound is at least as great, because [`optimum`](elbowroom_mdp::optimum) sometimes assumes less
 /// than the worst order.
 ///
 /// # Errors
@@ -50,7 +50,7 @@ pub fn timed(
     if world.events.iter().any(Event::is_recurrent) {
         return Err(PrismError::Rates);
     }
-    if !world.numbers.is_empty() {
+    if world.has_numbers() {
         return Err(PrismError::Numbers);
     }
     let has_outcomes = |act: &ActionModel| {

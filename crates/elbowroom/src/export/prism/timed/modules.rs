@@ -2,12 +2,12 @@
 
 use std::fmt::Write as _;
 
+use elbowroom_mdp::process::{ActionModel, EndProbabilities, Facts};
 use elbowroom_num::Rational;
 
 use super::super::bare;
 use super::super::formula::{Formula, choice, exact};
 use super::{Bound, Happening, Owner, Process};
-use crate::timed::{ActionModel, EndProbabilities, Facts};
 
 impl Process<'_> {
     /// Writes the module of an action: the time of its start, and its known end.

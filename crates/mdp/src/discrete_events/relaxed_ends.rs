@@ -8,27 +8,27 @@
 use indexmap::IndexMap;
 
 use super::postponement::may_be_better_later;
-use crate::timed::Side;
-use crate::timed::action_model::ActionModel;
-use crate::timed::cell_probabilities::CellProbabilities;
-use crate::timed::failures::Ending;
-use crate::timed::graph::{Choice, Target};
-use crate::timed::state::{Phase, State};
-use crate::timed::upper_bound::{Cell, Moment};
-use crate::timed::world::{Facts, TimedWorld};
+use crate::Side;
+use crate::action_model::ActionModel;
+use crate::cell_probabilities::CellProbabilities;
+use crate::failures::Ending;
+use crate::graph::{Choice, Target};
+use crate::state::{Phase, State};
+use crate::upper_bound::{Cell, Moment};
+use crate::world::{Facts, TimedWorld};
 
 /// Cache of [`may_be_better_later`], by facts, running actions, past events, and the end.
-pub(in crate::timed) type WaitingCache = IndexMap<(Facts, u64, u32, usize, Ending), bool>;
+pub(crate) type WaitingCache = IndexMap<(Facts, u64, u32, usize, Ending), bool>;
 
 /// Classes of actions that differ only in their starts. While they are running, they are
 /// interchangeable.
-pub(in crate::timed) struct EndClasses {
+pub(crate) struct EndClasses {
     /// By action: the actions of its class, as bits.
     of: Vec<u64>,
 }
 
 impl EndClasses {
-    pub(in crate::timed) fn new(world: &TimedWorld, chances: &CellProbabilities) -> Self {
+    pub(crate) fn new(world: &TimedWorld, chances: &CellProbabilities) -> Self {
         let end_alike = |one: usize, other: usize| {
             one == other
                 || (chances.ends[one] == chances.ends[other]
@@ -45,7 +45,7 @@ impl EndClasses {
 
     /// Returns the action that represents `act` while it is running: the first one of its class
     /// that is not running.
-    pub(in crate::timed) fn representative(&self, state: &State, act: usize) -> Option<usize> {
+    pub(crate) fn representative(&self, state: &State, act: usize) -> Option<usize> {
         let free = self.of[act] & !state.running_actions();
         (free != 0).then(|| free.trailing_zeros() as usize)
     }
@@ -69,7 +69,7 @@ fn has_same_end(one: &ActionModel, other: &ActionModel) -> bool {
 
 impl Cell<'_> {
     /// Returns the choices if there is a move that is optimal before all others.
-    pub(in crate::timed) fn dominant_choices(
+    pub(crate) fn dominant_choices(
         &mut self,
         moment: &Moment,
         startable: &[usize],
@@ -106,11 +106,7 @@ impl Cell<'_> {
 
     /// Returns the choices to restart a running action, or to start an action of the same class
     /// instead. There is no other use of cancelling, because actions need not end.
-    pub(in crate::timed) fn restart_choices(
-        &mut self,
-        moment: &Moment,
-        place: usize,
-    ) -> Vec<Choice> {
+    pub(crate) fn restart_choices(&mut self, moment: &Moment, place: usize) -> Vec<Choice> {
         let bound = self.bound;
         let world = bound.world;
         let (state, coming) = moment;
@@ -136,7 +132,7 @@ impl Cell<'_> {
     }
 
     /// Returns the target of waiting until the next possible happening.
-    pub(in crate::timed) fn advance_to_next_happening(&mut self, mut state: State) -> Target {
+    pub(crate) fn advance_to_next_happening(&mut self, mut state: State) -> Target {
         // The start of an action that is ready is irrelevant.
         for running in &mut state.running {
             if running.phase != Phase::Open {

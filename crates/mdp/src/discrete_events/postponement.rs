@@ -1,9 +1,9 @@
 //! Check whether an end may be better after another happening: [`may_be_better_later`].
 
-use crate::timed::action_model::{ActionModel, Needs, Snap};
-use crate::timed::failures::{Ending, FailureKind};
-use crate::timed::value_intervals::Amount;
-use crate::timed::world::{Facts, TimedWorld};
+use crate::action_model::{ActionModel, Needs, Snap};
+use crate::failures::{Ending, FailureKind};
+use crate::value_intervals::Amount;
+use crate::world::{Facts, TimedWorld};
 
 /// The changes by a happening.
 #[derive(Clone, Copy, Debug, Default)]

@@ -2,37 +2,37 @@
 //! in the order of their examination.
 
 use super::cells;
-use crate::timed::cell_probabilities::CellProbabilities;
-use crate::timed::lower_bound::{DecisionEpochs, LowerBound};
-use crate::timed::restricted_policy::fitting;
-use crate::timed::upper_bound::UpperBound;
-use crate::timed::world::TimedWorld;
-use crate::timed::{
+use crate::cell_probabilities::CellProbabilities;
+use crate::lower_bound::{DecisionEpochs, LowerBound};
+use crate::restricted_policy::fitting;
+use crate::upper_bound::UpperBound;
+use crate::world::TimedWorld;
+use crate::{
     Grid, NotTabulated, ROUNDING_MARGIN, Settings, Side, Stop, cell_probabilities_of, graph, step,
 };
 
 /// The bounds found.
-pub(in crate::timed) struct FoundBounds {
-    pub(in crate::timed) grid: Grid,
+pub(crate) struct FoundBounds {
+    pub(crate) grid: Grid,
     /// Number of cells of the lower bound.
-    pub(in crate::timed) cells: usize,
+    pub(crate) cells: usize,
     /// The restricted agent behind the lower bound.
-    pub(in crate::timed) within: Option<RestrictedAgent>,
+    pub(crate) within: Option<RestrictedAgent>,
     /// `true` for each side with a computed bound: below, above.
     is_computed: [bool; 2],
 }
 
 /// An agent restricted to a set of actions.
 #[derive(Clone)]
-pub(in crate::timed) struct RestrictedAgent {
+pub(crate) struct RestrictedAgent {
     /// The world of these actions.
-    pub(in crate::timed) world: TimedWorld,
-    pub(in crate::timed) epochs: DecisionEpochs,
+    pub(crate) world: TimedWorld,
+    pub(crate) epochs: DecisionEpochs,
 }
 
 /// Effort for bounds.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::timed) struct Effort {
+pub(crate) struct Effort {
     /// Divisors of the maximum number of states, for each bound; they are used one after the other
     /// until the bounds are close.
     shares: &'static [usize],
@@ -68,7 +68,7 @@ struct Search<'a> {
 
 /// Computes bounds from both sides if everything happens at known times; `None` if not, or if
 /// `goes_on` returns `false`.
-pub(in crate::timed) fn bounds(
+pub(crate) fn bounds(
     world: &TimedWorld,
     settings: &Settings,
     effort: Effort,
@@ -138,13 +138,13 @@ pub(in crate::timed) fn bounds(
 }
 
 impl Effort {
-    /// For bounds on the success probability ([`optimum`](crate::timed::optimum)).
-    pub(in crate::timed) const WHOLE: Self = Self {
+    /// For bounds on the success probability ([`optimum`](crate::optimum)).
+    pub(crate) const WHOLE: Self = Self {
         shares: &[12, 4],
         stops_at_too_many_states: false,
     };
     /// For a policy: the run has to wait for it.
-    pub(in crate::timed) const QUICK: Self = Self {
+    pub(crate) const QUICK: Self = Self {
         shares: &[12],
         stops_at_too_many_states: true,
     };
@@ -156,7 +156,7 @@ impl FoundBounds {
     }
 
     /// Returns `true` if both bounds are computed.
-    pub(in crate::timed) fn is_bounded(&self) -> bool {
+    pub(crate) fn is_bounded(&self) -> bool {
         self.is_computed == [true; 2]
     }
 }

@@ -12,14 +12,14 @@ use super::value_intervals::{Number, Span, Test};
 use super::{NotTabulated, Settings, Side as Bounding};
 
 /// A set of true facts.
-pub(crate) type Facts = u128;
+pub type Facts = u128;
 
-/// See [`timed`](super).
+/// A task in a world, as a semi-Markov decision process: see the [crate](super).
 #[derive(Clone, Debug)]
-pub(crate) struct TimedWorld {
+pub struct TimedWorld {
     pub(crate) model: WorldModel,
     /// The relevant facts; the position of each is its bit.
-    pub(crate) facts: Vec<FactId>,
+    pub facts: Vec<FactId>,
     pub(crate) numbers: Vec<Number>,
     /// Comparisons of numbers; their bits come after those of the facts.
     pub(super) tests: Vec<Test>,
@@ -27,10 +27,14 @@ pub(crate) struct TimedWorld {
     pub(super) tested: Facts,
     /// The side of the bound, which decides on comparisons that hold for some values only.
     side: Bounding,
-    pub(crate) acts: Vec<ActionModel>,
-    pub(crate) events: Vec<Event>,
-    pub(crate) initial: Facts,
-    pub(crate) goal: Needs,
+    /// The relevant actions.
+    pub acts: Vec<ActionModel>,
+    /// The relevant events of the world.
+    pub events: Vec<Event>,
+    /// The facts that are true at the beginning.
+    pub initial: Facts,
+    /// The condition of success.
+    pub goal: Needs,
     /// `true` if more facts are never worse: no condition requires a fact to be false.
     pub(crate) is_monotone: bool,
     /// The facts that an action or event may make false.
@@ -38,7 +42,7 @@ pub(crate) struct TimedWorld {
     /// The facts that an action or event may make true.
     addable: Facts,
     /// The latest end of a run, in seconds.
-    pub(crate) horizon: f64,
+    pub horizon: f64,
 }
 
 /// Maximum number of actions and events, which are bits.
@@ -49,11 +53,11 @@ const MOST_EVENTS: usize = 32;
 const MOST_FACTS: usize = 128;
 
 impl TimedWorld {
-    pub(crate) fn new(
-        task: &Task,
-        model: &WorldModel,
-        settings: &Settings,
-    ) -> Result<Self, NotTabulated> {
+    /// Compiles the task and the world.
+    ///
+    /// # Errors
+    /// When the task or the world has a feature that the process does not support.
+    pub fn new(task: &Task, model: &WorldModel, settings: &Settings) -> Result<Self, NotTabulated> {
         if let Some(feature) = task.validator_only_feature() {
             return Err(NotTabulated::new(format!("the problem has {feature}")));
         }
@@ -121,6 +125,11 @@ impl TimedWorld {
         world.compute_changes();
         world.horizon = world.latest_end(settings)?;
         Ok(world)
+    }
+
+    /// Returns `true` if the state contains numbers.
+    pub fn has_numbers(&self) -> bool {
+        !self.numbers.is_empty()
     }
 
     /// Computes the comparisons that each happening may make true.

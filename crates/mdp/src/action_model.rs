@@ -12,19 +12,26 @@ use super::world::Facts;
 
 /// A condition on facts.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum Needs {
+pub enum Needs {
+    /// All parts hold.
     All(Vec<Needs>),
+    /// At least one part holds.
     Any(Vec<Needs>),
+    /// The part does not hold.
     Not(Box<Needs>),
+    /// The fact is true; 0 for a fact that never is.
     Fact(Facts),
 }
 
 /// A start or an end.
 #[derive(Clone, Debug)]
-pub(crate) struct Snap {
-    pub(crate) needs: Needs,
-    pub(crate) adds: Facts,
-    pub(crate) deletes: Facts,
+pub struct Snap {
+    /// Its condition.
+    pub needs: Needs,
+    /// The facts that it makes true.
+    pub adds: Facts,
+    /// The facts that it makes false, unless it also adds them.
+    pub deletes: Facts,
     /// The changes of numbers.
     pub(crate) amounts: Vec<Amount>,
     /// The comparisons that may become true by these changes.
@@ -35,19 +42,21 @@ pub(crate) struct Snap {
 
 /// An action.
 #[derive(Clone, Debug)]
-pub(crate) struct ActionModel {
-    pub(crate) name: String,
+pub struct ActionModel {
+    /// Its name with objects, `(name object …)`.
+    pub name: String,
     pub(crate) action: Arc<Action>,
-    pub(crate) start: Snap,
+    /// Its start.
+    pub start: Snap,
     /// The over-all condition and the end; `None` for instantaneous actions.
-    pub(crate) rest: Option<(Needs, Snap)>,
+    pub rest: Option<(Needs, Snap)>,
     pub(crate) planned: Rational,
     /// Probability that it fails midway, given that it starts.
-    pub(crate) midway_failure: f64,
+    pub midway_failure: f64,
     /// Probability that it fails at its end, given that it starts.
-    pub(crate) end_failure: f64,
+    pub end_failure: f64,
     /// The possible outcomes of a failure; the shares add up to 1.
-    pub(crate) failures: Vec<FailureKind>,
+    pub failures: Vec<FailureKind>,
     /// `true` if cancelling it may be useful.
     pub(crate) may_be_cancelled: bool,
     /// `true` if starting it as soon as possible is always optimal.
@@ -56,9 +65,11 @@ pub(crate) struct ActionModel {
 
 /// An event of the world.
 #[derive(Clone, Debug)]
-pub(crate) struct Event {
-    pub(crate) adds: Facts,
-    pub(crate) deletes: Facts,
+pub struct Event {
+    /// The facts that it makes true.
+    pub adds: Facts,
+    /// The facts that it makes false, unless it also adds them.
+    pub deletes: Facts,
     pub(crate) occurs: Occurs,
 }
 
@@ -127,7 +138,7 @@ impl Needs {
     }
 
     /// Returns the facts that it reads.
-    pub(crate) fn mentions(&self) -> Facts {
+    pub fn mentions(&self) -> Facts {
         match self {
             Self::All(parts) | Self::Any(parts) => {
                 parts.iter().fold(0, |all, part| all | part.mentions())
@@ -164,7 +175,7 @@ impl Event {
     }
 
     /// Returns `true` if it may happen again, so that the state need not record its occurrence.
-    pub(crate) fn is_recurrent(&self) -> bool {
+    pub fn is_recurrent(&self) -> bool {
         matches!(self.occurs, Occurs::Rate(_))
     }
 

@@ -7,9 +7,9 @@ use std::collections::BTreeSet;
 use elbowroom_sim::Side as Part;
 
 use super::{Amount, ChangeOperator, ChangeValue, INFINITE, Span, UNIT};
-use crate::timed::action_model::{ActionModel, Snap};
-use crate::timed::world::{Facts, unknown_shape};
-use crate::timed::{NotTabulated, TimedWorld};
+use crate::action_model::{ActionModel, Snap};
+use crate::world::{Facts, unknown_shape};
+use crate::{NotTabulated, TimedWorld};
 
 /// Maximum number of cuts of a number, or of a random amount.
 const MOST_CUTS: usize = 64;
@@ -29,7 +29,7 @@ impl Amount {
 
 impl TimedWorld {
     /// Computes the cuts of numbers, and the possible draws of random amounts.
-    pub(in crate::timed) fn cut(&mut self) -> Result<(), NotTabulated> {
+    pub(crate) fn cut(&mut self) -> Result<(), NotTabulated> {
         for place in 0..self.numbers.len() {
             self.cut_number(place);
         }

@@ -1,4 +1,4 @@
-//! Probabilities of the ends of actions and of events in each cell: [`Chances`].
+//! Probabilities of the ends of actions and of events in each cell: [`CellProbabilities`].
 
 use elbowroom_sim::{Side as Part, rounding_edge};
 
@@ -9,18 +9,18 @@ use super::{NotTabulated, Side};
 
 /// Conditional probabilities of happenings in a cell, given that they have not taken place before.
 #[derive(Debug)]
-pub(crate) struct CellProbabilities {
+pub struct CellProbabilities {
     /// The number of cells.
-    pub(crate) cells: usize,
+    pub cells: usize,
     /// Ends of actions, by action and number of cells since the start.
-    pub(crate) ends: Vec<Vec<EndProbabilities>>,
+    pub ends: Vec<Vec<EndProbabilities>>,
     /// Events, by event and cell.
-    pub(crate) events: Vec<Vec<f64>>,
+    pub events: Vec<Vec<f64>>,
     /// Conditional probability that an event happens more than once in a cell if it happens there,
     /// by event and cell.
     pub(crate) repeated: Vec<Vec<f64>>,
     /// Probability that an event happens before the first decision, by event.
-    pub(crate) initial: Vec<f64>,
+    pub initial: Vec<f64>,
     /// The next number of cells with a possible end, by action and number of cells since the start;
     /// the next cell with a possible occurrence, by event and cell.
     pub(super) next_end: Vec<Vec<u32>>,
@@ -33,10 +33,11 @@ pub(super) const NEVER: u32 = u32::MAX;
 /// Conditional probabilities of the ends of an action in a cell, given that it has not ended
 /// before.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct EndProbabilities {
-    pub(crate) success: f64,
+pub struct EndProbabilities {
+    /// The probability of success.
+    pub success: f64,
     /// The probability of each kind of failure.
-    pub(crate) failures: Vec<f64>,
+    pub failures: Vec<f64>,
 }
 
 impl EndProbabilities {
@@ -45,7 +46,7 @@ impl EndProbabilities {
     }
 
     /// Returns the probability of any failure.
-    pub(crate) fn any_failure(&self) -> f64 {
+    pub fn any_failure(&self) -> f64 {
         self.failures.iter().sum()
     }
 

@@ -9,14 +9,15 @@ use super::world::Facts;
 
 /// An outcome of a failure.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct FailureKind {
+pub struct FailureKind {
     /// Conditional probability of this outcome, given that the action fails.
     pub(crate) share: f64,
     /// The added facts, without deleted ones.
-    pub(crate) adds: Facts,
-    pub(crate) deletes: Facts,
+    pub adds: Facts,
+    /// The deleted facts.
+    pub deletes: Facts,
     /// Time for which the failed action is still running and cannot be cancelled, in seconds.
-    pub(crate) delay: f64,
+    pub delay: f64,
 }
 
 /// The end of an action.

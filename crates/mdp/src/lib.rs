@@ -11,7 +11,7 @@
 //! its planner.
 //!
 //! **Numbers.** For a number that actions change, the state contains an interval of its values
-//! (`numbers`). A comparison is an additional fact. In the upper bound it holds if some of the
+//! (`value_intervals`). A comparison is an additional fact. In the upper bound it holds if some of the
 //! values satisfy it, in the lower bound if all do. Drawn values are divided into intervals where
 //! they decide a comparison.
 //!
@@ -36,14 +36,14 @@
 //! requires a fact to be false), fewer cases are examined.
 //!
 //! If everything happens at known times, there is no grid: states exist only when something happens
-//! or becomes ready to happen (`moments`).
+//! or becomes ready to happen (`discrete_events`).
 //!
 //! If plans are known, a further lower bound is that of an agent that uses only the actions of one
-//! of them and acts only after a happening (`within`). It needs far fewer states.
+//! of them and acts only after a happening (`restricted_policy`). It needs far fewer states.
 //!
 //! The cells are halved until the bounds are close enough, or there are too many states. If more
 //! facts are never harmful, the upper bound is then computed on finer grids of a *kinder* world
-//! (`kinder`), without events at random times that only delete facts. It has fewer states, and
+//! (`relaxed_world`), without events at random times that only delete facts. It has fewer states, and
 //! every agent succeeds in it at least as often. Probabilities are floating-point numbers; the
 //! bounds are widened by 1e-9, which is far more than the rounding errors.
 
@@ -70,12 +70,22 @@ use elbowroom_num::Rational;
 use elbowroom_sim::WorldModel;
 use serde::{Deserialize, Serialize};
 
-pub(crate) use action_model::{ActionModel, Event, Needs};
 pub use action_subsets::supported;
-pub(crate) use cell_probabilities::{CellProbabilities, EndProbabilities};
 pub use policy::Policy;
 pub use restricted_policy::RestrictedPolicy;
-pub(crate) use world::{Facts, TimedWorld};
+
+use action_model::Event;
+use cell_probabilities::CellProbabilities;
+use world::TimedWorld;
+
+/// The compiled process, for programs that write it in another form.
+pub mod process {
+    pub use crate::action_model::{ActionModel, Event, Needs, Snap};
+    pub use crate::cell_probabilities::{CellProbabilities, EndProbabilities};
+    pub use crate::failures::FailureKind;
+    pub use crate::world::{Facts, TimedWorld};
+    pub use crate::{Side, cell_probabilities_of};
+}
 
 /// Limits of the computation.
 #[derive(Clone, Debug, PartialEq)]
@@ -158,7 +168,7 @@ pub struct Grid {
 
 /// Direction of a bound on the best value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Side {
+pub enum Side {
     /// A lower bound.
     Below,
     /// An upper bound.
@@ -325,7 +335,10 @@ fn step(world: &TimedWorld, cells: usize) -> f64 {
 
 /// Returns the probabilities of happenings in each of `cells` cells, for a bound; `cells` is below
 /// 65,534.
-pub(crate) fn cell_probabilities_of(
+///
+/// # Errors
+/// When a distribution has no known probabilities.
+pub fn cell_probabilities_of(
     world: &TimedWorld,
     cells: usize,
     side: Side,
