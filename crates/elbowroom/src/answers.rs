@@ -48,7 +48,8 @@ pub use run::{RunAnswer, RunOutcome, RunProgress, RunRequest};
 pub use stn::{StnAnswer, StnOutcome, StnRequest};
 pub use violation::ViolationAnswer;
 
-use crate::box_text::BoxTextError;
+use elbowroom_plan::box_text::BoxTextError;
+
 use crate::duration_distributions::DistributionError;
 use crate::pipeline::PipelineError;
 

@@ -49,6 +49,7 @@ mod smt;
 mod write;
 
 use elbowroom_envelope::Guarantee;
+use elbowroom_envelope::linear_form::LinearForm;
 use elbowroom_envelope::obligations::Refusal;
 use elbowroom_model::Task;
 use elbowroom_network::{Format, NetworkFile};
@@ -58,7 +59,6 @@ use elbowroom_plan::{
 
 use crate::answers::envelope::{self, EnvelopeFinding, Range};
 use crate::answers::{EnvelopeAnswer, EnvelopeRequest};
-use crate::linear_form::LinearForm;
 use crate::pipeline::PipelineError;
 
 /// Largest number of positions that are distinguished for a moment inside an action.

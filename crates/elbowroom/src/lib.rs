@@ -159,29 +159,21 @@
 //! The library reads no clock and no files, and prints nothing.
 
 pub mod answers;
-mod box_text;
-pub mod dot;
 mod duration_distributions;
 pub mod execute;
 pub mod executive;
-mod explain;
 pub mod export;
 mod given_plan;
-mod linear_form;
-mod makespan;
 pub mod network;
 pub mod no_plan;
-mod pinning;
 pub mod pipeline;
-mod plan_file;
-mod plan_text;
-mod rounding;
 
-pub use box_text::{BoxTextError, parse_box, write_box};
 pub use duration_distributions::{
     DistributionError, duration_distribution, duration_distributions,
 };
 pub use elbowroom_envelope as envelope;
+pub use elbowroom_envelope::explain::{ANY_FINITE, Explainer, Explanation, Shortfall};
+pub use elbowroom_envelope::{Accepted, RoundingRule, plan_text};
 pub use elbowroom_execution as execution;
 pub use elbowroom_external as external;
 pub use elbowroom_learning as learning;
@@ -190,6 +182,9 @@ pub use elbowroom_model as model;
 pub use elbowroom_num as num;
 pub use elbowroom_pddl as pddl;
 pub use elbowroom_plan as plan;
+pub use elbowroom_plan::box_text::{BoxTextError, parse_box, write_box};
+pub use elbowroom_plan::makespan::earliest_end;
+pub use elbowroom_plan::{AnyPlan, PlanKind, dot};
 pub use elbowroom_planner as planner;
 pub use elbowroom_probability as probability;
 pub use elbowroom_report as report;
@@ -198,12 +193,7 @@ pub use elbowroom_stn as stn;
 pub use elbowroom_text as text;
 pub use elbowroom_verify as verify;
 pub use execute::execute;
-pub use explain::{ANY_FINITE, Explainer, Explanation, Shortfall};
 pub use given_plan::given_plan;
-pub use makespan::earliest_end;
-pub use plan_file::{AnyPlan, PlanKind};
-pub use plan_text::plan_text;
-pub use rounding::{Accepted, RoundingRule};
 
 /// The tutorial. Its code is compiled and run with the tests.
 pub mod tutorial {

@@ -28,7 +28,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("network", &["text", "num", "stn"]),
     ("pddl", &["text", "num", "model"]),
     ("plan", &["text", "num", "model", "stn"]),
-    ("envelope", &["num", "model", "stn", "plan"]),
+    ("envelope", &["text", "num", "model", "stn", "pddl", "plan"]),
     ("probability", &["text", "num", "model", "stn", "plan"]),
     ("planner", &["num", "model"]),
     ("external", &["num", "model", "pddl"]),

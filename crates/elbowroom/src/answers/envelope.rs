@@ -18,6 +18,7 @@ mod value_of_information;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use elbowroom_envelope::explain::{Explainer, Explanation};
 use elbowroom_envelope::obligations::Refusal;
 use elbowroom_envelope::{BestSettings, Growth, Guarantee, Method, Objective, Oracle};
 use elbowroom_execution::run::TimeoutRule;
@@ -29,7 +30,6 @@ use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan};
 use elbowroom_sim::WorldModel;
 
 use super::{Observer, RequestError, StopRequest};
-use crate::explain::{Explainer, Explanation};
 use crate::pipeline::{self, PipelineError};
 use crate::{AnyPlan, parse_box};
 

@@ -28,17 +28,6 @@ use super::vary::is_about_an_absent_action;
 use crate::answers::envelope::{PlannedTimeout, grow};
 use crate::pipeline::{self, PipelineError};
 
-impl From<PipelineError> for PrepareError {
-    fn from(error: PipelineError) -> Self {
-        match error {
-            PipelineError::Invalid(violation) => Self::Invalid(violation),
-            PipelineError::Deorder(error) => Self::Deorder(error),
-            PipelineError::Parametrize(error) => Self::Parametrize(error),
-            PipelineError::Refused(_) => Self::Unsupported(error.to_string()),
-        }
-    }
-}
-
 /// Prepares plans with [`pipeline`](crate::pipeline).
 #[derive(Clone)]
 pub struct PlanPreparer {
@@ -110,7 +99,7 @@ impl PlanPreparer {
         if specs.is_empty() && !self.settings.vary.is_empty() {
             return Ok(pipeline::without_parameters(task, freed));
         }
-        Ok(pipeline::open(task, freed, &specs)?)
+        pipeline::open(task, freed, &specs).map_err(preparation_error)
     }
 
     /// Returns the orderings that facts require: see [`Need::Orderings`].
@@ -169,7 +158,7 @@ impl Preparer for PlanPreparer {
         if is_about_orders && pipeline::validate_plan(task, plan).is_valid() {
             return Self::orderings(task, plan, need);
         }
-        let mut freed = pipeline::deorder_or_reschedule(task, plan)?;
+        let mut freed = pipeline::deorder_or_reschedule(task, plan).map_err(preparation_error)?;
         fix_running_starts(&mut freed.plan);
         if is_about_orders {
             return Self::orderings(task, plan, need);
@@ -403,5 +392,14 @@ impl RegionOracle for ExactRegion {
 
     fn fork(&self) -> Option<Box<dyn RegionOracle>> {
         Some(Box::new(*self))
+    }
+}
+
+fn preparation_error(error: PipelineError) -> PrepareError {
+    match error {
+        PipelineError::Invalid(violation) => PrepareError::Invalid(violation),
+        PipelineError::Deorder(error) => PrepareError::Deorder(error),
+        PipelineError::Parametrize(error) => PrepareError::Parametrize(error),
+        PipelineError::Refused(_) => PrepareError::Unsupported(error.to_string()),
     }
 }

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use elbowroom_envelope::Guarantee;
+use elbowroom_envelope::linear_form::{LinearForm, inequality};
 use elbowroom_envelope::obligations::{BadCase, Inequality};
 use elbowroom_model::Task;
 use elbowroom_num::{End, Rational};
@@ -12,7 +13,6 @@ use elbowroom_stn::uncertain::UncertainNetwork;
 
 use super::names;
 use super::write::{Symbols, all, number};
-use crate::linear_form::{LinearForm, inequality};
 
 /// A plan with its names.
 pub(super) struct Text<'a> {

@@ -1,8 +1,9 @@
 //! Boxes as text: `dur_0=[7/4,3829/4] (drive rover depot shelf)=12 all=±10%`.
 
 use elbowroom_num::{End, Interval, Rational};
-use elbowroom_plan::{DecoupledEnvelope, Parameter, ParameterId, ParameterKind, ParametrizedPlan};
 use elbowroom_text::nearest;
+
+use crate::{DecoupledEnvelope, Parameter, ParameterId, ParameterKind, ParametrizedPlan};
 
 /// The name for every parameter.
 const ALL: &str = "all";
@@ -220,7 +221,10 @@ impl Value {
 }
 
 /// Returns the parameter with that name, or the duration of that action.
-pub(crate) fn find(name: &str, plan: &ParametrizedPlan) -> Result<ParameterId, BoxTextError> {
+///
+/// # Errors
+/// When no parameter of the plan has this name.
+pub fn find(name: &str, plan: &ParametrizedPlan) -> Result<ParameterId, BoxTextError> {
     if let Some(id) = plan.find(name) {
         return Ok(id);
     }
@@ -281,9 +285,9 @@ fn known_names(plan: &ParametrizedPlan) -> String {
 mod tests {
     use std::collections::BTreeMap;
 
+    use crate::{Parameter, ParameterKind, ParametrizedPlan, StnPlan};
     use elbowroom_model::ground::Condition;
     use elbowroom_num::{Interval, Rational};
-    use elbowroom_plan::{Parameter, ParameterKind, ParametrizedPlan, StnPlan};
 
     use super::{BoxTextError, parse_box, write_box};
 

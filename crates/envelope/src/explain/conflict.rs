@@ -22,7 +22,7 @@ pub(super) struct Conflict {
 
 /// Known conflicts of a plan. Usually, a single conflict limits many ends.
 #[derive(Debug, Default)]
-pub(crate) struct KnownConflicts {
+pub struct KnownConflicts {
     conflicts: Vec<KnownConflict>,
     /// The conflicts of each parameter.
     by_parameter: BTreeMap<ParameterId, Vec<usize>>,
@@ -177,7 +177,7 @@ pub(super) fn find(explainer: &Explainer<'_>, valuation: &Valuation) -> Option<C
 impl Explainer<'_> {
     /// Describes a bound at the nominal values: a lower bound by the time that it takes, an upper
     /// bound by the time that it allows. `None` for mere orderings.
-    pub(crate) fn describe_bound(&self, constraint: &Constraint, side: Side) -> Option<String> {
+    pub fn describe_bound(&self, constraint: &Constraint, side: Side) -> Option<String> {
         let nominal = self.plan.nominal();
         match side {
             Side::Lower => describe_lower_bound(self, constraint, &nominal),
@@ -194,7 +194,7 @@ impl Explainer<'_> {
     /// Describes a sum of bounds: actions with the durations `takes` must fit into actions with the
     /// durations `gives` and into fixed bounds. Each bound is the position of a constraint of the
     /// plan, and a side of it. Bounds that are parameters are ignored.
-    pub(crate) fn describe_sum(
+    pub fn describe_sum(
         &self,
         takes: Vec<String>,
         gives: Vec<String>,

@@ -9,7 +9,6 @@
 //! validator's. Every command that reads a plan reads it by this rule; `docs/formats/plan.md`
 //! states it for users.
 
-use elbowroom_envelope::{RepairLimits, RepairRun, repair};
 use elbowroom_model::problem::Comparison;
 use elbowroom_model::validate::{
     self, Reason as Because, Settings, Verdict, Violation, ViolationKind,
@@ -26,6 +25,8 @@ use elbowroom_plan::{
 };
 use elbowroom_stn::{ConsistentNetwork, IncrementalWindows, Window};
 use elbowroom_text::Severity;
+
+use crate::{RepairLimits, RepairRun, repair};
 
 /// The largest difference that counts as rounding if the user gives no tolerance.
 const LARGEST_UNIT: (i64, i64) = (1, 1000);

@@ -2,8 +2,9 @@
 
 use elbowroom_model::TimeTriggeredPlan;
 use elbowroom_num::Rational;
-use elbowroom_plan::{Node, ParametrizedPlan, Valuation, network_node};
 use elbowroom_stn::{ConsistentNetwork, Constraint, Network, NodeId};
+
+use crate::{Node, ParametrizedPlan, Valuation, network_node};
 
 /// Returns the end time of the last action in the earliest schedule with these values of the
 /// parameters; `None` if the plan has no schedule. Durations that the executor chooses are as
@@ -19,7 +20,7 @@ pub fn earliest_end(plan: &ParametrizedPlan, valuation: &Valuation) -> Option<Ra
 }
 
 /// Returns the end time of the last action.
-pub(crate) fn last_end(plan: &TimeTriggeredPlan) -> Rational {
+pub fn last_end(plan: &TimeTriggeredPlan) -> Rational {
     let ends = plan.steps.iter().map(|step| {
         let duration = step.duration.clone().unwrap_or_default();
         &step.start + &duration
@@ -32,10 +33,7 @@ pub(crate) fn last_end(plan: &TimeTriggeredPlan) -> Rational {
 /// schedules; `None` if there are none at all.
 ///
 /// A plan that works only for other durations has at most the weak guarantee.
-pub(crate) fn with_fixed_choices(
-    plan: &ParametrizedPlan,
-    network: Network,
-) -> Option<ConsistentNetwork> {
+pub fn with_fixed_choices(plan: &ParametrizedPlan, network: Network) -> Option<ConsistentNetwork> {
     let mut told = network.clone();
     for constraint in &plan.plan.constraints {
         if let Some(duration) = plan.commanded_duration(constraint) {

@@ -1,7 +1,8 @@
 //! The two kinds of plans, and their detection in a text.
 
 use elbowroom_model::TimeTriggeredPlan;
-use elbowroom_plan::ParametrizedPlan;
+
+use crate::ParametrizedPlan;
 
 /// A plan of either kind.
 #[derive(Clone, Debug, PartialEq)]

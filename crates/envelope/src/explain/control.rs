@@ -1,10 +1,10 @@
 //! Explanations for boxes that no executor can guarantee, although there is a schedule for all
 //! values.
 
-use elbowroom_envelope::{ControlConflict, ControlGround};
 use elbowroom_plan::{DecoupledEnvelope, Node, NodeId, ParameterId, ParameterKind, Reason};
 
 use super::Explainer;
+use crate::{ControlConflict, ControlGround};
 
 impl Explainer<'_> {
     /// Describes the values that an executor would have to know in advance, and the constraints
@@ -76,7 +76,7 @@ impl Explainer<'_> {
     }
 
     /// Describes a constraint of the plan.
-    pub(crate) fn constraint(&self, index: usize) -> String {
+    pub fn constraint(&self, index: usize) -> String {
         let plan = &self.plan.plan;
         let constraint = &plan.constraints[index];
         let node = |id: NodeId| plan.describe_node(self.task, id);

@@ -5,11 +5,8 @@ mod conflict;
 mod control;
 mod timed;
 
-pub(crate) use conflict::KnownConflicts;
+pub use conflict::KnownConflicts;
 
-use elbowroom_envelope::obligations::Requirement;
-use elbowroom_envelope::soundness::{Broken, Counterexample};
-use elbowroom_envelope::{Limit, Objection, Oracle};
 use elbowroom_model::Task;
 use elbowroom_model::validate::{self, Verdict};
 use elbowroom_num::{Interval, Rational};
@@ -19,6 +16,10 @@ use elbowroom_plan::{
 };
 use elbowroom_stn::{ConsistentNetwork, Constraint};
 
+use crate::obligations::Requirement;
+use crate::soundness::{Broken, Counterexample};
+use crate::{Limit, Objection, Oracle};
+
 /// The reason for a finite end without a limit.
 pub const ANY_FINITE: &str = "every greater finite deviation is inside as well, but no fixed \
                               schedule is valid for all of them";
@@ -26,8 +27,10 @@ pub const ANY_FINITE: &str = "every greater finite deviation is inside as well, 
 /// Describes results about one plan in words.
 #[derive(Clone, Copy, Debug)]
 pub struct Explainer<'a> {
-    pub(crate) task: &'a Task,
-    pub(crate) plan: &'a ParametrizedPlan,
+    /// The task.
+    pub task: &'a Task,
+    /// The explained plan.
+    pub plan: &'a ParametrizedPlan,
 }
 
 /// An explanation of a failure of a plan.
@@ -53,7 +56,7 @@ pub struct Explanation {
 impl Explanation {
     /// Returns `true` if the only known problem is that processes and events take another course.
     /// The plan may also work with it.
-    pub(crate) fn may_be_harmless(&self, task: &Task) -> bool {
+    pub fn may_be_harmless(&self, task: &Task) -> bool {
         let is_accepted = self.schedule.is_some() && self.verdict.is_none();
         is_accepted && !task.autonomous().is_empty()
     }
@@ -106,7 +109,6 @@ impl<'a> Explainer<'a> {
                 strategies: self.adversary_strategies(refused),
                 ..self.without_example(self.uncontrollable_in(conflict, refused))
             },
-            other => self.without_example(other.to_string()),
         }
     }
 
@@ -133,7 +135,7 @@ impl<'a> Explainer<'a> {
     }
 
     /// Does the same, reusing the conflicts in `seen` that were computed for other ends.
-    pub(crate) fn limit_with_known_conflicts(
+    pub fn limit_with_known_conflicts(
         &self,
         (id, side): (ParameterId, Side),
         limit: &Limit,
@@ -148,7 +150,6 @@ impl<'a> Explainer<'a> {
                 Objection::NoSchedule(valuation) => seen.reason(self, id, valuation),
                 Objection::Broken(broken) => self.requirement(&broken.requirement),
                 Objection::Uncontrollable(conflict) => self.uncontrollable(conflict),
-                other => other.to_string(),
             }),
         }
     }
@@ -216,7 +217,7 @@ impl<'a> Explainer<'a> {
 
     /// Returns the validator's objection to the plan at these values with the earliest times.
     /// `None` as in [`verdict`](Self::verdict), and if there is no schedule.
-    pub(crate) fn verdict_at(&self, valuation: Valuation) -> Option<String> {
+    pub fn verdict_at(&self, valuation: Valuation) -> Option<String> {
         let network = self.plan.plan.network(&valuation);
         let network = ConsistentNetwork::try_from(network).ok()?;
         let schedule = network.earliest_schedule(network_node(NodeId::ZERO)).into();
@@ -316,7 +317,8 @@ impl<'a> Explainer<'a> {
         format!("an action whose start and end interfere takes at least {epsilon}")
     }
 
-    pub(crate) fn action_name(&self, id: InstanceId) -> &'a str {
+    /// Returns the action of an instance, `(name object …)`.
+    pub fn action_name(&self, id: InstanceId) -> &'a str {
         &self.plan.plan.instance(id).action.name
     }
 }

@@ -3,7 +3,8 @@
 use std::fmt::Write as _;
 
 use elbowroom_model::Task;
-use elbowroom_plan::{Bound, Constraint, Node, ParametrizedPlan, Reason};
+
+use crate::{Bound, Constraint, Node, ParametrizedPlan, Reason};
 
 /// Returns the network as a graph for Graphviz: `dot -Tsvg`.
 ///

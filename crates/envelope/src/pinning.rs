@@ -7,9 +7,6 @@
 //! alternately, together with those of the open durations, as long as every schedule works. So the
 //! pins and the durations share the slack.
 
-use elbowroom_envelope::linear::Factor;
-use elbowroom_envelope::obligations::Requirement;
-use elbowroom_envelope::soundness::{Broken, SoundBox, broken_in};
 use elbowroom_model::Task;
 use elbowroom_num::{End, Interval, Rational};
 use elbowroom_plan::deorder::{
@@ -21,12 +18,12 @@ use elbowroom_plan::{
     ParameterKind, ParametrizedPlan, Reason, Schedule, Side, StnPlan,
 };
 
+use crate::linear::Factor;
+use crate::obligations::Requirement;
+use crate::soundness::{Broken, SoundBox, broken_in};
+
 /// Does the same as [`sound`] for a deordered plan, which often needs no further bounds.
-pub(crate) fn pin_deordered(
-    task: &Task,
-    plan: ParametrizedPlan,
-    nominal: &Schedule,
-) -> ParametrizedPlan {
+pub fn pin_deordered(task: &Task, plan: ParametrizedPlan, nominal: &Schedule) -> ParametrizedPlan {
     if keeps_all_that_is_read(task, &plan, nominal) {
         return plan;
     }
@@ -36,7 +33,7 @@ pub(crate) fn pin_deordered(
 /// Returns the plan with as few fixed differences as possible, and with bounds as loose as
 /// possible, such that every nominal schedule works. If fixing all of them is not sufficient, the
 /// box check reports the problem later.
-pub(crate) fn pin(task: &Task, plan: &ParametrizedPlan, nominal: &Schedule) -> ParametrizedPlan {
+pub fn pin(task: &Task, plan: &ParametrizedPlan, nominal: &Schedule) -> ParametrizedPlan {
     // Too many open sides would lead to too many cases.
     let is_manageable = most_sides(&plan.plan) <= MOST_SIDES;
     if is_manageable && let Some(found) = pinned(task, plan, nominal) {
@@ -56,7 +53,7 @@ pub(crate) fn pin(task: &Task, plan: &ParametrizedPlan, nominal: &Schedule) -> P
 /// Returns the plan of a problem with processes and events with all its happenings in their order.
 /// Each happening keeps its distance from the one before it, within bounds that keep every schedule
 /// valid. Ends of actions with open durations keep only the order.
-pub(crate) fn pin_in_order(
+pub fn pin_in_order(
     task: &Task,
     mut plan: ParametrizedPlan,
     nominal: &Schedule,

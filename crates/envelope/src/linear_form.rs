@@ -3,11 +3,6 @@
 
 use std::collections::BTreeMap;
 
-use elbowroom_envelope::linear::Linear;
-use elbowroom_envelope::obligations::{
-    BadCase, Difference, Inequality, Obligation, Obligations, OverAll, Refusal, Requirement,
-};
-use elbowroom_envelope::reduction::Reduction;
 use elbowroom_model::Task;
 use elbowroom_num::{Interval, Rational};
 use elbowroom_plan::{
@@ -16,27 +11,33 @@ use elbowroom_plan::{
 };
 use elbowroom_stn::{ConsistentNetwork, Network, Windows};
 
+use crate::linear::Linear;
+use crate::obligations::{
+    BadCase, Difference, Inequality, Obligation, Obligations, OverAll, Refusal, Requirement,
+};
+use crate::reduction::Reduction;
+
 /// A plan's network and requirements, for values in a box.
 ///
 /// The plan works with values of the box exactly if the network has a schedule and no bad case
 /// holds in any of its schedules.
 #[derive(Clone, Debug)]
-pub(crate) struct LinearForm {
+pub struct LinearForm {
     /// The bounds on differences of times, including that no happening is before time zero.
-    pub(crate) network: Vec<NetworkBound>,
+    pub network: Vec<NetworkBound>,
     /// The requirements, with all their bad cases. These may refer to a moment inside an action:
     /// the node after the plan's last.
-    pub(crate) obligations: Vec<Obligation>,
+    pub obligations: Vec<Obligation>,
 }
 
 /// A bound on a difference of times.
 #[derive(Clone, Debug)]
-pub(crate) struct NetworkBound {
+pub struct NetworkBound {
     /// An inequality that holds in every schedule.
-    pub(crate) inequality: Inequality,
+    pub inequality: Inequality,
     /// The position of the plan's constraint, and its side; `None` if the bound only states that a
     /// node is not before time 0.
-    pub(crate) source: Option<(usize, Side)>,
+    pub source: Option<(usize, Side)>,
 }
 
 impl LinearForm {
@@ -46,7 +47,7 @@ impl LinearForm {
     ///
     /// # Errors
     /// When there is no schedule at `around`, or the plan is beyond exact analysis.
-    pub(crate) fn new(
+    pub fn new(
         task: &Task,
         plan: &ParametrizedPlan,
         values: &DecoupledEnvelope,
@@ -80,7 +81,7 @@ impl LinearForm {
 }
 
 /// Returns a difference of times as an inequality.
-pub(crate) fn inequality(difference: &Difference) -> Inequality {
+pub fn inequality(difference: &Difference) -> Inequality {
     let mut expression = Linear::difference(difference.from, difference.to);
     expression.constant = -&difference.bound;
     Inequality {
@@ -249,7 +250,7 @@ impl Order {
 }
 
 /// Returns the network with each parameter free within its interval.
-pub(crate) fn relaxed(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Network {
+pub fn relaxed(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Network {
     let mut network = Network::with_nodes(plan.plan.nodes.len());
     let zero = network_node(NodeId::ZERO);
     for (node, _) in plan.plan.nodes().skip(1) {
