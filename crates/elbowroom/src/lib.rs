@@ -126,8 +126,6 @@
 //! - [`answers`]: the questions of the command line as requests, with progress and cancelling.
 //! - [`pipeline`]: from a plan to its envelope in one call or step by step.
 //! - [`execute`](mod@execute): executes plans.
-//! - [`export`]: what other programs can check: a plan's network as an STNU, a box or the region as
-//!   SMT-LIB.
 //! - [`no_plan`]: certificates that no plan exists.
 //! - [`dot`]: networks as graphs for Graphviz.
 //! - [`Explainer`]: explains what limits an envelope, and why a plan fails ([`Explanation`],
@@ -154,7 +152,8 @@
 //! - [`sim`]: simulated worlds.
 //! - [`report`]: traces, replays, statistics, tables and plots.
 //!
-//! Experiments that compare executors are a crate of their own, `elbowroom-laboratory`.
+//! Experiments that compare executors are a crate of their own, `elbowroom-laboratory`, and so are
+//! exports for other programs, `elbowroom-export`.
 //!
 //! The library reads no clock and no files, and prints nothing.
 
@@ -162,7 +161,6 @@ pub mod answers;
 mod duration_distributions;
 pub mod execute;
 pub mod executive;
-pub mod export;
 mod given_plan;
 pub mod network;
 pub mod no_plan;

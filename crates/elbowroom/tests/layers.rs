@@ -62,6 +62,21 @@ const LAYERS: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "export",
+        &[
+            "num",
+            "model",
+            "stn",
+            "network",
+            "plan",
+            "envelope",
+            "probability",
+            "sim",
+            "mdp",
+            "elbowroom",
+        ],
+    ),
+    (
         "laboratory",
         &[
             "text",
@@ -83,7 +98,14 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("executive", &["elbowroom", "page"]),
     (
         "cli",
-        &["calendar", "elbowroom", "laboratory", "page", "executive"],
+        &[
+            "calendar",
+            "elbowroom",
+            "export",
+            "laboratory",
+            "page",
+            "executive",
+        ],
     ),
     ("python", &["elbowroom", "laboratory", "executive", "cli"]),
     // A separate program that communicates with the command by the protocol of worlds.

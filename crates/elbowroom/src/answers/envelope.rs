@@ -360,7 +360,7 @@ pub fn partial_result(
 /// # Errors
 /// When the validator rejects the plan, the request names things that the plan does not have, or
 /// the problem has processes or events.
-pub(crate) fn parametrized_plan(
+pub fn parametrized_plan(
     request: &EnvelopeRequest,
 ) -> Result<(ParametrizedPlan, usize), PipelineError> {
     match request.task.unsupported_by_analysis() {

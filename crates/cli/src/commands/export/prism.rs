@@ -3,9 +3,9 @@
 
 use std::sync::Arc;
 
-use elbowroom::export::prism::{self, PrismError};
 use elbowroom::mdp;
 use elbowroom::probability::{likelihoods, optimum};
+use elbowroom_export::prism::{self, PrismError};
 
 use crate::args::{Bound, ExportArgs};
 use crate::exit::Failure;

@@ -16,7 +16,7 @@
 //!
 //! use elbowroom::answers::EnvelopeRequest;
 //! use elbowroom::envelope::Guarantee;
-//! use elbowroom::export::{box_check, parametrized_plan};
+//! use elbowroom_export::{box_check, parametrized_plan};
 //! use elbowroom::model::Task;
 //! use elbowroom::parse_box;
 //! use elbowroom::pddl::{self, Source};
@@ -48,6 +48,9 @@ pub mod prism;
 mod smt;
 mod write;
 
+use elbowroom::answers::envelope::{self, EnvelopeFinding, Range};
+use elbowroom::answers::{EnvelopeAnswer, EnvelopeRequest};
+use elbowroom::pipeline::PipelineError;
 use elbowroom_envelope::Guarantee;
 use elbowroom_envelope::linear_form::LinearForm;
 use elbowroom_envelope::obligations::Refusal;
@@ -56,10 +59,6 @@ use elbowroom_network::{Format, NetworkFile};
 use elbowroom_plan::{
     BoxEnd, DecoupledEnvelope, NodeId, ParameterId, ParametrizedPlan, network_node,
 };
-
-use crate::answers::envelope::{self, EnvelopeFinding, Range};
-use crate::answers::{EnvelopeAnswer, EnvelopeRequest};
-use crate::pipeline::PipelineError;
 
 /// Largest number of positions that are distinguished for a moment inside an action.
 const MOST_POSITIONS: usize = 4_096;

@@ -3,7 +3,7 @@
 //! - [`untimed`]: the process of a problem with likelihoods, without time. Its greatest probability
 //!   of reaching the goal is the optimum of [`optimum`](elbowroom_probability::optimum).
 //! - [`timed`]: the process of a problem in a world, with its clock divided into cells. Its value
-//!   bounds the success probability of the best executor without foresight ([`crate::timed`]).
+//!   bounds the success probability of the best executor without foresight ([`elbowroom_mdp`]).
 //!
 //! Both are written from the actions' conditions and effects; the model checker enumerates the
 //! states. Probabilities are decimal numbers with all their digits, so that tools with exact

@@ -13,7 +13,7 @@ use elbowroom_sim::WorldModel;
 
 use super::formula::Formula;
 use super::{PrismError, bare, checked};
-use crate::export::names::distinct;
+use crate::names::distinct;
 
 /// Direction of the bound on the best value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

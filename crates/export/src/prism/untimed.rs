@@ -13,7 +13,7 @@ use elbowroom_probability::{Likelihoods, Model, Semantics, all_actions_under};
 
 use super::formula::{Formula, choice, exact};
 use super::{PrismError, bare, checked, dead_ends};
-use crate::export::names::distinct;
+use crate::names::distinct;
 
 /// Maximum number of states in the search for dead ends.
 const MOST_STATES: usize = 1 << 18;
