@@ -163,7 +163,6 @@ pub mod execute;
 pub mod executive;
 mod given_plan;
 pub mod network;
-pub mod no_plan;
 pub mod pipeline;
 
 pub use duration_distributions::{
@@ -184,6 +183,7 @@ pub use elbowroom_plan::box_text::{BoxTextError, parse_box, write_box};
 pub use elbowroom_plan::makespan::earliest_end;
 pub use elbowroom_plan::{AnyPlan, PlanKind, dot};
 pub use elbowroom_planner as planner;
+pub use elbowroom_planner::no_plan;
 pub use elbowroom_probability as probability;
 pub use elbowroom_report as report;
 pub use elbowroom_sim as sim;

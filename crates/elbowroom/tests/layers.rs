@@ -30,7 +30,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("plan", &["text", "num", "model", "stn"]),
     ("envelope", &["text", "num", "model", "stn", "pddl", "plan"]),
     ("probability", &["text", "num", "model", "stn", "plan"]),
-    ("planner", &["num", "model"]),
+    ("planner", &["num", "model", "verify"]),
     ("external", &["num", "model", "pddl"]),
     ("execution", &["num", "model", "stn", "plan", "probability"]),
     ("sim", &["text", "num", "model", "probability", "execution"]),

@@ -18,7 +18,7 @@ use super::{Event, Exact, Observer, PlanProgress, RequestError, StopRequest, Ver
 use crate::execute::exhausted;
 use crate::plan_text;
 
-pub use crate::no_plan::no_plan_certificate_from;
+pub use elbowroom_planner::no_plan::no_plan_certificate_from;
 pub use external::{PlannerFailure, plan_with};
 pub use improving::{BetterPlan, ImprovingPlans, ImprovingPlansRequest, NextPlan};
 pub use objective::{

@@ -7,8 +7,7 @@ use elbowroom_execution::{PlanAnswer, Planner, PlannerAnswer};
 use elbowroom_model::{Situation, Task};
 use elbowroom_num::Rational;
 use elbowroom_planner::embedded::{self, Counts, Proof, Stopped};
-
-use crate::no_plan::{Effort, no_plan_certificate_within, with_any_ends};
+use elbowroom_planner::no_plan::{Effort, no_plan_certificate_within, with_any_ends};
 
 /// A planner without a clock: a function from situations to answers.
 pub struct FnPlanner<F>(pub F);

@@ -10,9 +10,9 @@ use elbowroom_model::validate::{Settings, validate_from};
 use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 use elbowroom_planner::embedded::{self, Objective};
+use elbowroom_planner::no_plan::{Effort, conflict, earliest_times, with_any_ends};
 
 use super::planners::Embedded;
-use crate::no_plan::{Effort, conflict, earliest_times, with_any_ends};
 
 /// Share of the limits of a plan that a search without deadlines may take.
 const LIMIT_DIVISOR: u64 = 4;
