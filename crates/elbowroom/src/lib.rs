@@ -160,7 +160,6 @@
 pub mod answers;
 mod duration_distributions;
 pub mod execute;
-pub mod executive;
 mod given_plan;
 pub mod network;
 pub mod pipeline;

@@ -1,6 +1,6 @@
 //! JSON schemas of documents, generated from their declarations.
 
-use elbowroom_report::exact::Exact;
+use elbowroom::report::exact::Exact;
 use serde_json::{Map, Value, json};
 
 /// A type whose JSON form can be described.
@@ -84,7 +84,7 @@ macro_rules! documents {
                 )*
             }
 
-            impl $crate::executive::Described for $name {
+            impl $crate::interface::Described for $name {
                 fn schema(
                     definitions: &mut serde_json::Map<String, serde_json::Value>,
                 ) -> serde_json::Value {

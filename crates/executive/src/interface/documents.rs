@@ -2,9 +2,9 @@
 
 use std::fmt;
 
-use elbowroom_num::{End, Rational};
-use elbowroom_report::exact::{self, Exact};
-use elbowroom_report::wire;
+use elbowroom::num::{End, Rational};
+use elbowroom::report::exact::{self, Exact};
+use elbowroom::report::wire;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use serde_json::{Map, Value, json};
 

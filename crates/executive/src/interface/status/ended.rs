@@ -2,8 +2,8 @@
 
 use std::collections::VecDeque;
 
-use elbowroom_num::Rational;
-use elbowroom_report::exact::Exact;
+use elbowroom::num::Rational;
+use elbowroom::report::exact::Exact;
 
 use super::super::documents::{EndedAction, Running};
 

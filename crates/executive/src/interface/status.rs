@@ -6,26 +6,25 @@ mod goals;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use elbowroom_execution::run::{PROBLEM_GOAL_NAME, TimeoutRule, Verdict};
-use elbowroom_execution::{
+use elbowroom::execution::run::{PROBLEM_GOAL_NAME, TimeoutRule, Verdict};
+use elbowroom::execution::{
     ActionHandle, BeliefState, Cause, Command, Decided, Decision, Doubt, Entry, Event, GoalTerms,
     GuaranteeLevel, Observation, PreparedPlan, Request, StepId, WarningCause,
 };
-use elbowroom_model::ground::{FactId, FluentId};
-use elbowroom_model::{Situation, Task};
-use elbowroom_num::Rational;
-use elbowroom_pddl::{ProblemText, write_problem};
-use elbowroom_plan::{InstanceId, ParameterId, ParameterKind};
-use elbowroom_report::exact::Exact;
-use elbowroom_report::trace::{ClosedGoalLine, SnapshotLine};
-
-use ended::EndedActions;
-use goals::GoalList;
+use elbowroom::model::ground::{FactId, FluentId};
+use elbowroom::model::{Situation, Task};
+use elbowroom::num::Rational;
+use elbowroom::pddl::{ProblemText, write_problem};
+use elbowroom::plan::{InstanceId, ParameterId, ParameterKind};
+use elbowroom::report::exact::Exact;
+use elbowroom::report::trace::{ClosedGoalLine, SnapshotLine};
 
 use super::documents::{
     Activity, GoalNow, GoalsNow, GuaranteeNow, InDoubt, LowerEnd, NextNow, NumberNow, PlanNow,
     Room, Running, State, StepNow, UpperEnd,
 };
+use ended::EndedActions;
+use goals::GoalList;
 
 /// Follows a persistent run by its record. Clones share the state. Requests are answered at once
 /// and do not block the run, because names are computed from a copy of the belief state.

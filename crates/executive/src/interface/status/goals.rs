@@ -2,10 +2,10 @@
 
 use std::collections::VecDeque;
 
-use elbowroom_execution::{GoalChange, GoalTerms};
-use elbowroom_num::Rational;
-use elbowroom_report::exact::Exact;
-use elbowroom_report::trace::{ClosedGoalLine, GoalLine, SnapshotLine, WaitLine};
+use elbowroom::execution::{GoalChange, GoalTerms};
+use elbowroom::num::Rational;
+use elbowroom::report::exact::Exact;
+use elbowroom::report::trace::{ClosedGoalLine, GoalLine, SnapshotLine, WaitLine};
 
 use super::super::documents::{GoalNow, GoalsNow, OpenGoal};
 
