@@ -49,9 +49,10 @@ pub use stn::{StnAnswer, StnOutcome, StnRequest};
 pub use violation::ViolationAnswer;
 
 use elbowroom_plan::box_text::BoxTextError;
+use elbowroom_selection::box_search::BoxSearchError;
 
-use crate::duration_distributions::DistributionError;
 use crate::pipeline::PipelineError;
+use elbowroom_selection::DistributionError;
 
 /// A reason for a missing answer: the request cannot be understood, or exceeds the analysis.
 #[derive(Debug, thiserror::Error)]
@@ -76,4 +77,13 @@ pub enum RequestError {
     /// The problem has this unsupported feature.
     #[error("{0}")]
     Unsupported(String),
+}
+
+impl From<BoxSearchError> for RequestError {
+    fn from(error: BoxSearchError) -> Self {
+        match error {
+            BoxSearchError::Pipeline(error) => Self::Pipeline(error),
+            BoxSearchError::Distribution(error) => Self::Distribution(error),
+        }
+    }
 }

@@ -158,15 +158,11 @@
 //! The library reads no clock and no files, and prints nothing.
 
 pub mod answers;
-mod duration_distributions;
 pub mod execute;
 mod given_plan;
 pub mod network;
 pub mod pipeline;
 
-pub use duration_distributions::{
-    DistributionError, duration_distribution, duration_distributions,
-};
 pub use elbowroom_envelope as envelope;
 pub use elbowroom_envelope::explain::{ANY_FINITE, Explainer, Explanation, Shortfall};
 pub use elbowroom_envelope::{Accepted, RoundingRule, plan_text};
@@ -185,6 +181,7 @@ pub use elbowroom_planner as planner;
 pub use elbowroom_planner::no_plan;
 pub use elbowroom_probability as probability;
 pub use elbowroom_report as report;
+pub use elbowroom_selection::{DistributionError, duration_distribution, duration_distributions};
 pub use elbowroom_sim as sim;
 pub use elbowroom_stn as stn;
 pub use elbowroom_text as text;

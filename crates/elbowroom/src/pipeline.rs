@@ -2,49 +2,16 @@
 
 use std::sync::Arc;
 
-use elbowroom_envelope::Guarantee;
-use elbowroom_execution::run::TimeoutRule;
 use elbowroom_model::{Task, TimeTriggeredPlan};
-use elbowroom_plan::parametrize::VarySpec;
-use elbowroom_sim::WorldModel;
 
 pub use elbowroom_envelope::pipeline::{
     PipelineError, deorder_and_open, deorder_or_reschedule, free, open, open_more_quantities,
     reschedule, validate_plan, without_parameters,
 };
+pub use elbowroom_selection::EnvelopeSettings as Settings;
 
-use crate::answers::envelope::{Search, envelope};
+use crate::answers::envelope::envelope;
 use crate::answers::{EnvelopeOutcome, EnvelopeRequest, NoObserver, RequestError};
-
-/// The quantities to vary, and the settings of the search.
-#[derive(Clone, Debug)]
-pub struct Settings {
-    /// Quantities to leave open; if empty, all durations that the domain fixes.
-    pub vary: Vec<VarySpec>,
-    /// The guarantee inside the envelope.
-    pub guarantee: Guarantee,
-    /// The rule that sets the time-out of each action.
-    pub timeout: TimeoutRule,
-    /// Settings of the search for the box.
-    pub search: Search,
-    /// World whose distributions of durations
-    /// [`Objective::Probability`](elbowroom_envelope::Objective::Probability) uses.
-    pub world: Option<Arc<WorldModel>>,
-}
-
-impl Default for Settings {
-    /// Returns settings with all durations open that the domain fixes, the dynamic guarantee, and
-    /// the default search.
-    fn default() -> Self {
-        Self {
-            vary: Vec::new(),
-            guarantee: Guarantee::default(),
-            timeout: TimeoutRule::default(),
-            search: Search::default(),
-            world: None,
-        }
-    }
-}
 
 /// Computes the envelope of a plan with fixed times.
 ///

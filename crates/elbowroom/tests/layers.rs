@@ -37,6 +37,24 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("report", &["num", "model", "plan", "execution"]),
     ("mdp", &["num", "model", "execution", "sim"]),
     ("learning", &["text", "num", "sim", "report"]),
+    (
+        "selection",
+        &[
+            "num",
+            "model",
+            "stn",
+            "pddl",
+            "plan",
+            "envelope",
+            "probability",
+            "planner",
+            "external",
+            "execution",
+            "sim",
+            "report",
+            "mdp",
+        ],
+    ),
     // Time zones, used only by the command.
     ("calendar", &["text", "num", "model", "pddl"]),
     (
@@ -58,6 +76,7 @@ const LAYERS: &[(&str, &[&str])] = &[
             "report",
             "learning",
             "mdp",
+            "selection",
             "verify",
         ],
     ),

@@ -8,13 +8,13 @@ use elbowroom_plan::{
     DecoupledEnvelope, Node, NodeId, ParameterId, ParameterKind, ParametrizedPlan, Schedule, Side,
     Valuation,
 };
+use elbowroom_selection::timeouts::timeouts;
 
 use super::Subject;
 use super::answer::{
     ActionTimes, ChosenDuration, Counterexample, LimitedRange, Makespans, MovedEnd, Quantity,
     QuantityKind, Range, Stop, WideningStep,
 };
-use super::timeouts::timeouts;
 use crate::answers::{Exact, StopRequest};
 
 impl From<StopRequest> for Stop {

@@ -3,10 +3,10 @@
 use elbowroom_model::{Situation, Task};
 use elbowroom_planner::no_plan::{Effort, fluents_without_value, no_plan_certificate_within};
 use elbowroom_planner::{Counts, Proof};
+use elbowroom_selection::WITHOUT_SELF_OVERLAP;
 use elbowroom_verify::no_plan::NoPlan;
 
 use super::{PlanAnswer, PlanFinding, PlanStop, SearchMonitor};
-use crate::execute::WITHOUT_SELF_OVERLAP;
 
 /// Work limit for the certificate of an answer: about a minute.
 const MOST_WORK: u64 = 500_000_000;

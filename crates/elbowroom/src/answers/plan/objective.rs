@@ -232,7 +232,7 @@ pub fn best_plan(
     };
     let stop = ended.unwrap_or(stop);
     let answer = course.answer(request.task, (finding, choice), (stop, counts));
-    let plan = plan.and_then(|plan| crate::execute::renumbered(request.task, &plan));
+    let plan = plan.and_then(|plan| elbowroom_selection::renumbered(request.task, &plan));
     Ok(PlanOutcome { answer, plan })
 }
 

@@ -16,11 +16,11 @@ use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::{Rational, work};
 use elbowroom_planner::embedded;
 use elbowroom_probability::Likelihoods;
+use elbowroom_selection::timeouts::unknown_action;
 use elbowroom_sim::{ControlledWorld, SimWorld, WorldModel};
 use elbowroom_text::Diagnostics;
 
 use super::{EMBEDDED, NO_PLANNER, RunSpec};
-use crate::answers::envelope::unknown_action;
 use crate::execute::{
     ActionSets, AdversarialWorld, Embedded, Execution, External, FirstPlan, MostProbablePlanner,
     PlanPreparer, PlanSelector, Replanning, RolloutPolicy, Rollouts, SelectingPlanner,

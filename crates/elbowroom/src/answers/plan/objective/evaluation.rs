@@ -193,7 +193,7 @@ fn samples(
             }
             results.push(tryout.succeeds(plan, sample));
         }
-        if crate::execute::is_behind(&results, best) {
+        if elbowroom_selection::is_behind(&results, best) {
             break;
         }
     }

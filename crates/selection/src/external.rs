@@ -1,15 +1,14 @@
-//! Other planners behind the port of [`execution`](crate::execution).
+//! Other planners behind the port of [`elbowroom_execution`].
 
 use std::ops::ControlFlow;
 use std::time::Duration;
 
+use elbowroom_envelope::pipeline;
 use elbowroom_execution::{PlanAnswer, Planner, PlannerAnswer, Shortfall};
 use elbowroom_external::{self as external, Event, Outcome, Report, Request, Settings};
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 use elbowroom_pddl::Source;
-
-use crate::pipeline;
 
 /// A supervised planner process. Each of its plans is validated; if only its times are rounded,
 /// they are computed again.

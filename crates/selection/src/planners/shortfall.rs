@@ -12,7 +12,7 @@ use elbowroom_num::Rational;
 use elbowroom_planner::embedded::{self, Objective};
 use elbowroom_planner::no_plan::{Effort, conflict, earliest_times, with_any_ends};
 
-use super::planners::Embedded;
+use super::Embedded;
 
 /// Share of the limits of a plan that a search without deadlines may take.
 const LIMIT_DIVISOR: u64 = 4;

@@ -13,8 +13,8 @@ use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 use elbowroom_sim::ObservedChanges;
 
-use super::super::rollouts::{BudgetedPlanner, Rollouts};
 use super::{Alternative, RolloutPolicy, SEED};
+use crate::rollouts::{BudgetedPlanner, Rollouts};
 
 /// Shared data of all samples of one scene.
 pub(super) struct SampleSet {

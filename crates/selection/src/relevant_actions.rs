@@ -10,8 +10,10 @@ use elbowroom_num::Rational;
 use elbowroom_sim::WorldModel;
 use indexmap::IndexMap;
 
-use super::{Candidates, Embedded, Limits, Replanning, RolloutSession, Rollouts};
-use crate::pipeline;
+use crate::box_search::EnvelopeSettings;
+use crate::candidates::{Candidates, Limits};
+use crate::planners::Embedded;
+use crate::rollouts::{Replanning, RolloutSession, Rollouts};
 
 /// Maximum number of plans.
 const MOST_PLANS: usize = 8;
@@ -126,7 +128,7 @@ fn fallbacks(
             planning_time: PlanningTime::Seconds(Rational::ZERO),
             ..RunSettings::default()
         },
-        flow: pipeline::Settings::default(),
+        flow: EnvelopeSettings::default(),
         likelihoods: Arc::default(),
         replanning: Some(replanning),
         is_ready: true,

@@ -12,9 +12,12 @@ use elbowroom_planner::embedded;
 use elbowroom_probability::Likelihoods;
 use elbowroom_sim::WorldModel;
 
-use super::plan_selection::renumbered;
-use super::{CachingPlanner, CachingPreparer, Embedded, Execution, PlanPreparer};
-use crate::pipeline;
+use crate::box_search::EnvelopeSettings;
+use crate::cache::{CachingPlanner, CachingPreparer};
+use crate::execution::Execution;
+use crate::plan_preparer::PlanPreparer;
+use crate::planners::Embedded;
+use crate::renumbering::renumbered;
 
 /// First seed of the samples, far from seeds that users choose.
 const SEED: u64 = 0x7472_7900_0000_0000;
@@ -32,7 +35,7 @@ pub struct Rollouts {
     /// Settings of the runs.
     pub settings: RunSettings,
     /// The open quantities, and the search for envelopes.
-    pub flow: pipeline::Settings,
+    pub flow: EnvelopeSettings,
     /// The executor's likelihoods.
     pub likelihoods: Arc<Likelihoods>,
     /// Settings of replanning; without them, no new plans are made.

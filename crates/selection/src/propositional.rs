@@ -148,7 +148,7 @@ fn assume_comparisons(condition: &Condition, truth: bool) -> Condition {
 
 /// Returns the plan with each planned duration in place of `?duration`: numbers that depend on
 /// durations are computed as planned.
-pub(crate) fn with_fixed_durations(plan: &TimeTriggeredPlan) -> TimeTriggeredPlan {
+pub fn with_fixed_durations(plan: &TimeTriggeredPlan) -> TimeTriggeredPlan {
     TimeTriggeredPlan {
         steps: plan.steps.iter().map(with_fixed_duration).collect(),
     }

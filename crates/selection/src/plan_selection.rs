@@ -15,11 +15,12 @@ use elbowroom_probability::{
 };
 use serde::{Deserialize, Serialize};
 
-use super::candidates::{Candidate, Candidates, Limits};
-use super::planners::{CERTIFICATE_WORK, FIRST_PLAN_FACTOR, without_plan};
-use super::race::{Rules, race};
-use super::rollouts::{RolloutSession, Rollouts};
-use super::with_fixed_durations;
+use crate::candidates::{Candidate, Candidates, Limits};
+use crate::planners::{CERTIFICATE_WORK, FIRST_PLAN_FACTOR, without_plan};
+use crate::propositional::with_fixed_durations;
+use crate::race::{Rules, race};
+use crate::renumbering::renumbered;
+use crate::rollouts::{RolloutSession, Rollouts};
 
 /// Maximum number of compared plans.
 const MOST_PLANS: usize = 12;
@@ -367,20 +368,6 @@ fn order_probability(
     });
     let best = found.ok()?.order.map(|order| order.probability);
     [own, best].into_iter().flatten().reduce(f64::max)
-}
-
-/// Returns the same plan with the fact numbers of this task.
-pub(crate) fn renumbered(task: &Task, plan: &TimeTriggeredPlan) -> Option<TimeTriggeredPlan> {
-    let steps = plan.steps.iter().map(|step| {
-        let action = task.instantiate(step.action.schema, &step.action.arguments);
-        Some(Step {
-            action: Arc::new(action.ok()?),
-            start: step.start.clone(),
-            duration: step.duration.clone(),
-        })
-    });
-    let steps = steps.collect::<Option<Vec<_>>>()?;
-    Some(TimeTriggeredPlan { steps })
 }
 
 /// A planner whose first plan is [chosen](PlanSelector).

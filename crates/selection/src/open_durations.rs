@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use elbowroom_envelope::pipeline;
 use elbowroom_model::Task;
 use elbowroom_num::{Interval, Rational};
 use elbowroom_plan::{
@@ -9,8 +10,6 @@ use elbowroom_plan::{
     Schedule, Side, StnPlan, Valuation, network_node,
 };
 use elbowroom_stn::{ConsistentNetwork, Constraint, Network};
-
-use crate::pipeline;
 
 /// Returns the actions to be started whose durations the domain leaves open. The executor chooses their durations.
 fn open_durations(plan: &StnPlan) -> BTreeSet<InstanceId> {

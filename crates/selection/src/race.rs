@@ -40,7 +40,7 @@ impl Tally {
 
 /// Returns `true` if `results` are significantly behind `others` in the samples that both have:
 /// McNemar's test of the samples with a single success.
-pub(crate) fn is_behind(results: &[bool], others: &[bool]) -> bool {
+pub fn is_behind(results: &[bool], others: &[bool]) -> bool {
     let (own, theirs) = differences(results, others);
     theirs > own && (theirs - own).pow(2) > SIGNIFICANT_LAG.pow(2) * (theirs + own)
 }

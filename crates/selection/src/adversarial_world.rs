@@ -11,7 +11,7 @@ use elbowroom_sim::{DurationController, StartedAction};
 use elbowroom_stn::NodeId as NetworkNode;
 use elbowroom_stn::uncertain::{Adversary, UncertainNetwork};
 
-/// An [`Adversary`] behind the port of [`sim`](crate::sim). It observes starts, and decides when
+/// An [`Adversary`] behind the port of [`elbowroom_sim`]. It observes starts, and decides when
 /// actions end.
 ///
 /// Actions outside the plan, and durations that the box does not leave open, are as planned. Every

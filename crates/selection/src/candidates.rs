@@ -32,8 +32,9 @@ use elbowroom_planner::{Counts, embedded};
 use elbowroom_sim::WorldModel;
 use elbowroom_stn::{ConsistentNetwork, NodeId};
 
-use super::plan_selection::renumbered;
+use crate::renumbering::renumbered;
 use scarcity::scarcities;
+
 pub use variant::Pace;
 use variant::{Variant, duration_fixed_by_domain, to_millionths};
 

@@ -8,8 +8,8 @@ use elbowroom_num::Rational;
 use elbowroom_sim::draw::keyed;
 use elbowroom_sim::{Purpose, Rule, WorldModel};
 
-use super::super::rewrite::add_function_of;
 use super::variant::{SAMPLES, SEED, quantile_index};
+use crate::rewrite::add_function_of;
 
 /// Scarcity of amounts in a variant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

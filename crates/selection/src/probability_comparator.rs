@@ -18,8 +18,8 @@ use elbowroom_sim::draw::keyed;
 use elbowroom_sim::{Purpose, WorldModel};
 use elbowroom_stn::ConsistentNetwork;
 
-use super::planners::Embedded;
-use super::rewrite::set_durations;
+use crate::planners::Embedded;
+use crate::rewrite::set_durations;
 
 /// Number of sampled worlds per plan.
 const SAMPLES: u64 = 200;

@@ -4,7 +4,9 @@ use std::fmt;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use elbowroom_envelope::explain::Explainer;
 use elbowroom_envelope::obligations::Refusal;
+use elbowroom_envelope::pipeline::{self, PipelineError};
 use elbowroom_envelope::{Guarantee, Oracle, Settings as SearchSettings, irr};
 use elbowroom_execution::{
     DispatchableCache, PlanForm, PreparationResult, PrepareError, Preparer, RegionOracle,
@@ -22,16 +24,17 @@ use elbowroom_plan::{
 };
 use elbowroom_stn::ConsistentNetwork;
 
-use super::open_durations;
-use super::propositional::{to_propositional, with_fixed_durations};
-use super::vary::is_about_an_absent_action;
-use crate::answers::envelope::{PlannedTimeout, grow};
-use crate::pipeline::{self, PipelineError};
+use crate::box_search::EnvelopeSettings;
+use crate::box_search::grow;
+use crate::open_durations;
+use crate::propositional::{to_propositional, with_fixed_durations};
+use crate::timeouts::PlannedTimeout;
+use crate::vary::is_about_an_absent_action;
 
-/// Prepares plans with [`pipeline`](crate::pipeline).
+/// Prepares plans with [`pipeline`].
 #[derive(Clone)]
 pub struct PlanPreparer {
-    settings: pipeline::Settings,
+    settings: EnvelopeSettings,
     limit: Option<Limit>,
 }
 
@@ -51,7 +54,7 @@ impl fmt::Debug for PlanPreparer {
 impl PlanPreparer {
     /// Creates a preparer. It ignores the specifications in `settings.vary` that name nothing in a
     /// plan.
-    pub fn new(settings: pipeline::Settings) -> Self {
+    pub fn new(settings: EnvelopeSettings) -> Self {
         Self {
             settings,
             limit: None,
@@ -328,7 +331,7 @@ impl RegionOracle for ExactRegion {
             return Self::validate_at(task, plan, values).err();
         };
         let objection = objection?;
-        let explainer = crate::Explainer::new(task, oracle.plan());
+        let explainer = Explainer::new(task, oracle.plan());
         Some(explainer.objection(&oracle, &envelope, &objection).reason)
     }
 
@@ -357,7 +360,7 @@ impl RegionOracle for ExactRegion {
             return judged();
         };
         let known = run.envelope.map_err(|objection| {
-            let explainer = crate::Explainer::new(task, oracle.plan());
+            let explainer = Explainer::new(task, oracle.plan());
             let point = DecoupledEnvelope::point(values);
             explainer.objection(&oracle, &point, &objection).reason
         })?;

@@ -1,4 +1,6 @@
-//! Planners behind the port of [`execution`](crate::execution).
+//! Planners behind the port of [`elbowroom_execution`].
+
+mod shortfall;
 
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -73,11 +75,7 @@ impl Default for Embedded<'_> {
 
 impl Embedded<'_> {
     /// Returns the answer, and the number of evaluated states.
-    pub(crate) fn plan_with_state_count(
-        &self,
-        task: &Task,
-        situation: &Situation,
-    ) -> (PlanAnswer, u64) {
+    pub fn plan_with_state_count(&self, task: &Task, situation: &Situation) -> (PlanAnswer, u64) {
         let mut states = 0;
         let answer = self.answer(task, situation, &mut states);
         (answer, states)
@@ -173,7 +171,7 @@ fn no_plan_reason(stopped: Stopped, counts: (Counts, bool), most_states: u64) ->
 }
 
 /// Returns the reason why there is no plan after a search of all reachable states.
-pub(crate) fn exhausted(counts: Counts, without_self_overlap: bool) -> String {
+pub fn exhausted(counts: Counts, without_self_overlap: bool) -> String {
     let evaluated = counts.evaluated;
     let without = if without_self_overlap {
         " without self-overlap (`--self-overlap`)"
@@ -188,7 +186,7 @@ pub(crate) fn exhausted(counts: Counts, without_self_overlap: bool) -> String {
 
 /// Beginning of the answer after a search of all plans without self-overlap, if no certificate
 /// covers the others.
-pub(crate) const WITHOUT_SELF_OVERLAP: &str = "no plan without self-overlap (`--self-overlap`)";
+pub const WITHOUT_SELF_OVERLAP: &str = "no plan without self-overlap (`--self-overlap`)";
 
 /// Work limit for a certificate in a run: about a second.
 pub(crate) const CERTIFICATE_WORK: u64 = 10_000_000;

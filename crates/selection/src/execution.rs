@@ -15,8 +15,9 @@ use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_pddl::{Diagnostics, Source};
 use elbowroom_probability::Likelihoods;
 
-use super::{Embedded, ExactRegion, PlanPreparer, SharedRolloutPolicy};
-use crate::pipeline;
+use crate::box_search::EnvelopeSettings;
+use crate::plan_preparer::{ExactRegion, PlanPreparer};
+use crate::planners::Embedded;
 
 /// Reads a goal in PDDL for a running execution of this task: the condition alone, without `:goal`.
 ///
@@ -59,12 +60,12 @@ pub fn execute(
 /// ```
 /// use std::sync::Arc;
 ///
-/// use elbowroom::execute::Execution;
-/// use elbowroom::execution::run::{Next, Verdict};
-/// use elbowroom::execution::{Command, Event, Ending, Observation, TimeAdvance};
-/// use elbowroom::model::Task;
-/// use elbowroom::num::Rational;
-/// use elbowroom::pddl::{self, Source};
+/// use elbowroom_selection::Execution;
+/// use elbowroom_execution::run::{Next, Verdict};
+/// use elbowroom_execution::{Command, Event, Ending, Observation, TimeAdvance};
+/// use elbowroom_model::Task;
+/// use elbowroom_num::Rational;
+/// use elbowroom_pddl::{self as pddl, Source};
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let domain = Source::new("domain", "
@@ -115,13 +116,13 @@ pub struct Execution<'a> {
     restarts: usize,
     executor: ExecutorChoice<'a>,
     settings: RunSettings,
-    flow: pipeline::Settings,
+    flow: EnvelopeSettings,
     likelihoods: Arc<Likelihoods>,
     foresight: PolicyTableCache,
     plan_comparator: Option<Box<dyn PlanComparator>>,
     action_values: Option<Arc<dyn ActionValues>>,
     missing_table_reason: Option<String>,
-    rollouts: Option<SharedRolloutPolicy>,
+    rollouts: Option<Box<dyn RunRollouts + 'a>>,
     planner: Option<Box<dyn Planner + 'a>>,
     preparer: Option<Box<dyn Preparer + 'a>>,
     recorder: Box<dyn Recorder + 'a>,
@@ -141,6 +142,17 @@ enum ExecutorChoice<'a> {
     Custom(Box<dyn Executor + 'a>),
 }
 
+/// The rollouts of a run, a port: they evaluate its decisions, and may already know the best plan
+/// for a situation.
+pub trait RunRollouts {
+    /// Returns an evaluator of decisions.
+    fn evaluator(&self) -> Box<dyn RolloutEvaluator>;
+
+    /// Returns a planner that answers with the best plan, if one was found for the situation, and
+    /// otherwise calls `planner`.
+    fn wrap_planner<'a>(&self, planner: Box<dyn Planner + 'a>) -> Box<dyn Planner + 'a>;
+}
+
 impl<'a> Execution<'a> {
     /// Creates an execution of a task, without an initial plan.
     pub fn of(task: &Arc<Task>) -> Self {
@@ -151,7 +163,7 @@ impl<'a> Execution<'a> {
             restarts: 0,
             executor: ExecutorChoice::Registered(ExecutorSpec::default()),
             settings: RunSettings::default(),
-            flow: pipeline::Settings::default(),
+            flow: EnvelopeSettings::default(),
             likelihoods: Arc::new(Likelihoods::certain()),
             foresight: PolicyTableCache::default(),
             plan_comparator: None,
@@ -210,7 +222,7 @@ impl<'a> Execution<'a> {
     }
 
     /// Sets the open quantities, the guarantee and the search of envelopes.
-    pub fn with_envelopes(self, flow: pipeline::Settings) -> Self {
+    pub fn with_envelopes(self, flow: EnvelopeSettings) -> Self {
         Self { flow, ..self }
     }
 
@@ -244,7 +256,7 @@ impl<'a> Execution<'a> {
     }
 
     /// Records the reason for a missing outlook of an executor that evaluates each move.
-    pub(crate) fn with_missing_table_reason(self, no_table: Option<String>) -> Self {
+    pub fn with_missing_table_reason(self, no_table: Option<String>) -> Self {
         Self {
             missing_table_reason: no_table,
             ..self
@@ -258,9 +270,9 @@ impl<'a> Execution<'a> {
     }
 
     /// Sets the rollouts, for executors that evaluate each move without an outlook.
-    pub fn with_rollouts(self, rehearsal: Option<SharedRolloutPolicy>) -> Self {
+    pub fn with_rollouts<R: RunRollouts + 'a>(self, rollouts: Option<R>) -> Self {
         Self {
-            rollouts: rehearsal,
+            rollouts: rollouts.map(|it| Box::new(it) as Box<dyn RunRollouts + 'a>),
             ..self
         }
     }
@@ -328,7 +340,6 @@ impl<'a> Execution<'a> {
     /// plans.
     #[must_use = "a run does nothing until `next` is called"]
     pub fn run(self) -> (Run<'a>, Box<dyn Workers + 'a>) {
-        let rehearsal = self.rollouts.clone();
         let executor = match self.executor {
             ExecutorChoice::Custom(executor) => executor,
             ExecutorChoice::Registered(executor) => executor.build(ExecutorServices {
@@ -338,14 +349,14 @@ impl<'a> Execution<'a> {
                 policy_cache: self.foresight,
                 order_cache: None,
                 action_values: self.action_values,
-                rollout: rehearsal.map(|it| Box::new(it) as Box<dyn RolloutEvaluator>),
+                rollout: self.rollouts.as_ref().map(|it| it.evaluator()),
             }),
         };
         let planner = self
             .planner
             .unwrap_or_else(|| Box::new(Embedded::default()));
         let planner = match &self.rollouts {
-            Some(rehearse) => rehearse.wrap_planner(planner),
+            Some(rollouts) => rollouts.wrap_planner(planner),
             None => planner,
         };
         let preparer = self

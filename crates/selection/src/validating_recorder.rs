@@ -7,17 +7,17 @@ use elbowroom_execution::{Entry, Recorder};
 use elbowroom_model::Task;
 use elbowroom_report::validation::{Invalid, Validation};
 
-use super::read_goal;
+use crate::execution::read_goal;
 
 /// A recorder that also gives each entry to the validator.
 ///
 /// ```
 /// use std::sync::Arc;
 ///
-/// use elbowroom::execute::{Execution, Validated};
-/// use elbowroom::execution::NoRecord;
-/// use elbowroom::model::{Problem, Task};
-/// use elbowroom::sim::{SimWorld, WorldModel};
+/// use elbowroom_selection::{Execution, Validated};
+/// use elbowroom_execution::NoRecord;
+/// use elbowroom_model::{Problem, Task};
+/// use elbowroom_sim::{SimWorld, WorldModel};
 ///
 /// let task = Arc::new(Task::new(Problem::default()));
 /// let (recorder, validation) = Validated::new(NoRecord, &task, None);

@@ -18,12 +18,15 @@ use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::{Rational, work};
 use elbowroom_sim::{ExogenousChange, Rule};
 
-use super::plan_selection::renumbered;
-use super::race::{Rules, Tally, is_behind, race};
-use super::rollouts::Rollouts;
-use crate::pipeline;
-
-use super::{CachingPreparer, Candidates, Embedded, ExactRegion, Limits, PlanPreparer};
+use crate::box_search::EnvelopeSettings;
+use crate::cache::CachingPreparer;
+use crate::candidates::{Candidates, Limits};
+use crate::execution::RunRollouts;
+use crate::plan_preparer::{ExactRegion, PlanPreparer};
+use crate::planners::Embedded;
+use crate::race::{Rules, Tally, is_behind, race};
+use crate::renumbering::renumbered;
+use crate::rollouts::Rollouts;
 use sample_set::SampleSet;
 
 /// Executors that may adopt a new plan instead of `live`.
@@ -107,17 +110,21 @@ impl SharedRolloutPolicy {
         Self(Arc::new(Mutex::new(rehearse)))
     }
 
-    /// Returns a planner that answers with the best plan, if one was found for the situation, and
-    /// otherwise calls `planner`.
-    pub(super) fn wrap_planner<'a>(&self, planner: Box<dyn Planner + 'a>) -> Box<dyn Planner + 'a> {
+    fn get(&self) -> MutexGuard<'_, RolloutPolicy> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl RunRollouts for SharedRolloutPolicy {
+    fn evaluator(&self) -> Box<dyn RolloutEvaluator> {
+        Box::new(self.clone())
+    }
+
+    fn wrap_planner<'a>(&self, planner: Box<dyn Planner + 'a>) -> Box<dyn Planner + 'a> {
         Box::new(PreselectingPlanner {
             rehearse: self.clone(),
             planner,
         })
-    }
-
-    fn get(&self) -> MutexGuard<'_, RolloutPolicy> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -141,7 +148,7 @@ impl RolloutEvaluator for SharedRolloutPolicy {
 
 /// Returns the preparer of adopted plans, and that of plans in samples.
 fn preparers(
-    flow: &pipeline::Settings,
+    flow: &EnvelopeSettings,
 ) -> (CachingPreparer<PlanPreparer>, CachingPreparer<PlanPreparer>) {
     let analyst = PlanPreparer::new(flow.clone());
     let hasty = analyst.clone().with_limit(|| ControlFlow::Break(()));

@@ -13,8 +13,8 @@ use elbowroom_num::Rational;
 use elbowroom_sim::draw::keyed;
 use elbowroom_sim::{ExogenousChange, Purpose, WorldModel};
 
-use super::super::rewrite::{add_function_of, set_durations};
 use super::scarcity::Scarcity;
+use crate::rewrite::{add_function_of, set_durations};
 
 /// Number of samples for a quantile.
 pub(super) const SAMPLES: u64 = 100;
