@@ -48,9 +48,11 @@ pub use run::{RunAnswer, RunOutcome, RunProgress, RunRequest};
 pub use stn::{StnAnswer, StnOutcome, StnRequest};
 pub use violation::ViolationAnswer;
 
-use crate::box_text::BoxTextError;
-use crate::duration_distributions::DistributionError;
+use elbowroom_plan::box_text::BoxTextError;
+use elbowroom_selection::box_search::BoxSearchError;
+
 use crate::pipeline::PipelineError;
+use elbowroom_selection::DistributionError;
 
 /// A reason for a missing answer: the request cannot be understood, or exceeds the analysis.
 #[derive(Debug, thiserror::Error)]
@@ -75,4 +77,13 @@ pub enum RequestError {
     /// The problem has this unsupported feature.
     #[error("{0}")]
     Unsupported(String),
+}
+
+impl From<BoxSearchError> for RequestError {
+    fn from(error: BoxSearchError) -> Self {
+        match error {
+            BoxSearchError::Pipeline(error) => Self::Pipeline(error),
+            BoxSearchError::Distribution(error) => Self::Distribution(error),
+        }
+    }
 }

@@ -126,12 +126,8 @@
 //! - [`answers`]: the questions of the command line as requests, with progress and cancelling.
 //! - [`pipeline`]: from a plan to its envelope in one call or step by step.
 //! - [`execute`](mod@execute): executes plans.
-//! - [`export`]: what other programs can check: a plan's network as an STNU, a box or the region as
-//!   SMT-LIB.
 //! - [`no_plan`]: certificates that no plan exists.
 //! - [`dot`]: networks as graphs for Graphviz.
-//! - [`timed`]: what the best of all executors could reach on a clock, and the policy that reaches
-//!   it.
 //! - [`Explainer`]: explains what limits an envelope, and why a plan fails ([`Explanation`],
 //!   [`Shortfall`]).
 //! - [`parse_box`], [`write_box`]: boxes as text ([`BoxTextError`]).
@@ -150,61 +146,48 @@
 //! - [`plan`]: networks of plans, and their parameters.
 //! - [`envelope`]: decides whether a box is inside the envelope, and searches for a large one.
 //! - [`probability`]: success probabilities, and the best order of a plan's actions.
+//! - [`mdp`]: bounds on the success probability of the best executor on a clock, and its policy.
 //! - [`planner`]: the embedded planner; [`external`]: other planners, as supervised processes.
 //! - [`execution`]: executors, and the run of a plan.
 //! - [`sim`]: simulated worlds.
 //! - [`report`]: traces, replays, statistics, tables and plots.
 //!
-//! Experiments that compare executors are a crate of their own, `elbowroom-laboratory`.
+//! Experiments that compare executors are a crate of their own, `elbowroom-laboratory`, and so are
+//! exports for other programs, `elbowroom-export`.
 //!
 //! The library reads no clock and no files, and prints nothing.
 
 pub mod answers;
-mod box_text;
-pub mod dot;
-mod duration_distributions;
 pub mod execute;
-pub mod executive;
-mod explain;
-pub mod export;
 mod given_plan;
-mod linear_form;
-mod makespan;
 pub mod network;
-pub mod no_plan;
-mod pinning;
 pub mod pipeline;
-mod plan_file;
-mod plan_text;
-mod rounding;
-pub mod timed;
 
-pub use box_text::{BoxTextError, parse_box, write_box};
-pub use duration_distributions::{
-    DistributionError, duration_distribution, duration_distributions,
-};
 pub use elbowroom_envelope as envelope;
+pub use elbowroom_envelope::explain::{ANY_FINITE, Explainer, Explanation, Shortfall};
+pub use elbowroom_envelope::{Accepted, RoundingRule, plan_text};
 pub use elbowroom_execution as execution;
 pub use elbowroom_external as external;
 pub use elbowroom_learning as learning;
+pub use elbowroom_mdp as mdp;
 pub use elbowroom_model as model;
 pub use elbowroom_num as num;
 pub use elbowroom_pddl as pddl;
 pub use elbowroom_plan as plan;
+pub use elbowroom_plan::box_text::{BoxTextError, parse_box, write_box};
+pub use elbowroom_plan::makespan::earliest_end;
+pub use elbowroom_plan::{AnyPlan, PlanKind, dot};
 pub use elbowroom_planner as planner;
+pub use elbowroom_planner::no_plan;
 pub use elbowroom_probability as probability;
 pub use elbowroom_report as report;
+pub use elbowroom_selection::{DistributionError, duration_distribution, duration_distributions};
 pub use elbowroom_sim as sim;
 pub use elbowroom_stn as stn;
 pub use elbowroom_text as text;
 pub use elbowroom_verify as verify;
 pub use execute::execute;
-pub use explain::{ANY_FINITE, Explainer, Explanation, Shortfall};
 pub use given_plan::given_plan;
-pub use makespan::earliest_end;
-pub use plan_file::{AnyPlan, PlanKind};
-pub use plan_text::plan_text;
-pub use rounding::{Accepted, RoundingRule};
 
 /// The tutorial. Its code is compiled and run with the tests.
 pub mod tutorial {

@@ -13,7 +13,6 @@ use std::sync::Arc;
 use elbowroom::answers::envelope::envelope;
 use elbowroom::answers::{EnvelopeRequest, NoObserver};
 use elbowroom::envelope::{Guarantee, Oracle};
-use elbowroom::export::{ExportError, box_check, box_of, parametrized_plan, region, stnu};
 use elbowroom::model::Task;
 use elbowroom::network::{
     NetworkFile, Request, Verdict, analyze, read, write_graphml, write_json, write_plain,
@@ -23,6 +22,7 @@ use elbowroom::parse_box;
 use elbowroom::pddl::{Source, read_plan, read_problem};
 use elbowroom::plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan};
 use elbowroom::{AnyPlan, write_box};
+use elbowroom_export::{ExportError, box_check, box_of, parametrized_plan, region, stnu};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use shared::case::Case;

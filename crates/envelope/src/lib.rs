@@ -13,6 +13,12 @@
 //! - [`repair()`]: the cheapest change of quantities that makes a plan work.
 //! - [`max_uniform_slack()`]: the deviation that all quantities tolerate at once.
 //! - [`Objection`]: the reason why a box is not inside, with values and a schedule that show it.
+//! - [`explain::Explainer`]: what limits a box, and why a plan fails, in words.
+//! - [`mod@pipeline`]: from a plan with fixed times to a network with open quantities.
+//! - [`pinning`]: fixes differences of times where numeric conditions need it.
+//! - [`linear_form`]: all conditions on the schedules of a plan as linear inequalities.
+//! - [`RoundingRule`], [`plan_text()`]: plans whose numbers were rounded, and such text for other
+//!   tools.
 //!
 //! Linear programs and minimum cost flows are solved here. `elbowroom-execution` does not depend on
 //! this crate, so that an executor can run without a solver.
@@ -65,19 +71,25 @@ mod cut_pool;
 mod cycles;
 mod enforce;
 mod exact;
+pub mod explain;
 mod feasibility;
 mod frontier;
 mod guarantee;
 mod irr;
 mod line_search;
 pub mod linear;
+pub mod linear_form;
 mod method;
 mod objection;
 pub mod obligations;
 mod oracle;
+pub mod pinning;
+pub mod pipeline;
+mod plan_text;
 mod proof;
 pub mod reduction;
 mod repair;
+mod rounding;
 mod row;
 mod sharpen;
 pub mod soundness;
@@ -99,11 +111,13 @@ pub use irr::{IrrRun, Limit, Settings, StopReason, Widening, irr, limits};
 pub use method::Method;
 pub use objection::Objection;
 pub use oracle::Oracle;
+pub use plan_text::plan_text;
 pub use proof::{
     ConditionProof, ControlProof, ImpossibilityProof, Refutation, RefutedCase, ScheduleCase,
     Strategy, Summand, TimeRule,
 };
 pub use repair::{BindingConstraint, Changeable, Repair, RepairLimits, RepairRun, repair};
+pub use rounding::{Accepted, RoundingRule};
 pub use row::Row;
 pub use sharpen::sharpen;
 pub use uniform_slack::{DeviationBounds, UniformSlack, max_uniform_slack};

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use elbowroom::execute::{NamedText, RunSpec};
 use elbowroom::execution::run::PROBLEM_GOAL_NAME;
-use elbowroom::executive::documents::{GoalNow, NewGoal};
+use elbowroom_executive::interface::documents::{GoalNow, NewGoal};
 use elbowroom_executive::{Executive, ExecutiveSettings};
 
 /// Name of the goal that is submitted before the crash.

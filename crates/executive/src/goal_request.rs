@@ -3,11 +3,11 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use elbowroom::execution::{GoalTerms, Request};
-use elbowroom::executive::Status;
-use elbowroom::executive::documents::NewGoal;
 use elbowroom::num::Rational;
 
 use crate::error::Error;
+use crate::interface::Status;
+use crate::interface::documents::NewGoal;
 use crate::request_queue::ExternalRequest;
 
 /// Prefix of the names of goals that are given without a name.

@@ -7,12 +7,12 @@ use elbowroom::execution::run::RunSnapshot;
 use elbowroom::execution::{
     Command, Ending, Entry, Event, Observation, Recorder, TimeAdvance, World, WorldError,
 };
-use elbowroom::executive::Status;
 use elbowroom::model::Task;
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
 use elbowroom::report::trace::{Line, SnapshotLine, snapshot_text};
 
+use crate::interface::Status;
 use crate::journal::JournalFile;
 use crate::operator::OperatorInterface;
 use crate::request_queue::RequestQueue;

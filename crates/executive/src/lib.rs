@@ -15,6 +15,8 @@
 //! - [`EmbeddedWorld`]: a world that is an object in the process of its executive.
 //! - [`http`], [`api`], [`trace_buffer`]: HTTP server and client, the interface of an executive (`docs/serve.md`), and
 //!   the buffer of the trace for clients.
+//! - [`interface`]: the requests and responses of an executive as types, its `OpenAPI` document, and the state of a
+//!   run for clients.
 //! - [`clock`], [`memory_limit`], [`messages`]: wall clock, memory limit, texts of messages.
 //!
 //! This crate makes threads, reads clocks and writes files. It prints nothing: warnings go to a
@@ -32,6 +34,7 @@ mod error;
 mod executive;
 mod goal_request;
 pub mod http;
+pub mod interface;
 pub mod journal;
 pub mod journaling;
 pub mod learning;

@@ -10,9 +10,10 @@ use std::sync::Arc;
 
 use elbowroom::execution::run::RunSnapshot;
 use elbowroom::execution::{Entry, Recorder};
-use elbowroom::executive::Status;
 use elbowroom::model::Task;
 use elbowroom::report::trace::{Line, SnapshotLine, snapshot_text};
+
+use crate::interface::Status;
 
 pub use interactive_world::InteractiveWorld;
 

@@ -2,11 +2,11 @@
 
 use elbowroom::execute::{ill_typed_part, obstacle_to_deadline, read_goal};
 use elbowroom::execution::{ActionHandle, GoalTerms, Request};
-use elbowroom::executive::Status;
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
 
 use crate::error::Error;
+use crate::interface::Status;
 use crate::request_queue::{ExternalRequest, RequestQueue};
 
 /// Limit on the name of a goal, in bytes.

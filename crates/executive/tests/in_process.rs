@@ -9,9 +9,9 @@ use elbowroom::execution::{
     ActionHandle, Command as WorldCommand, Ending, Event, GoalTerms, Observation, Request,
     TimeAdvance, World, WorldError,
 };
-use elbowroom::executive::documents::{Activity, GoalNow, NewGoal};
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
+use elbowroom_executive::interface::documents::{Activity, GoalNow, NewGoal};
 use elbowroom_executive::request_queue::{ExternalRequest, RequestStatus};
 use elbowroom_executive::{EmbeddedWorld, Executive, ExecutiveSettings, StartedAction};
 

@@ -18,11 +18,11 @@ use std::time::Instant;
 use elbowroom::execute::{
     Embedded, ExactRegion, Execution, Replanning, RolloutPolicy, Rollouts, SharedRolloutPolicy,
 };
+use elbowroom::mdp::{Policy, Settings};
 use elbowroom::pipeline;
 use elbowroom_execution::executors::{ExecutorServices, ExecutorSpec, PolicyTableCache};
 use elbowroom_execution::run::{RunSettings, Verdict};
 use elbowroom_execution::{ActionValues, PlanAnswer, Planner};
-use elbowroom_laboratory::timed::{Policy, Settings};
 use elbowroom_model::{Situation, Task};
 use elbowroom_pddl::{Source, read_problem};
 use elbowroom_probability::Likelihoods;

@@ -10,7 +10,6 @@
 //! - [`perturbed`]: worlds without time, in which starts and effects fail and facts change
 //!   spontaneously (`docs/perturbed-worlds.md`); the experiments of paper 2.
 //! - [`record`]: the result of each trial, as a table for other programs.
-//! - [`timed`]: bounds on the value of the optimal policy on a clock.
 //! - [`untimed`]: executors for worlds without time, and the rules of a trial.
 //! - [`worlds`]: worlds without time.
 //!
@@ -31,8 +30,6 @@ pub mod perturbed;
 pub mod record;
 pub mod untimed;
 pub mod worlds;
-
-pub use elbowroom::timed;
 
 /// Tutorial. Its code is compiled and run with the tests.
 pub mod tutorial {

@@ -14,10 +14,10 @@ mod twin;
 use std::sync::Arc;
 
 use elbowroom::execute::{Embedded, Execution};
+use elbowroom::mdp::{Policy, Settings};
 use elbowroom_execution::run::{Report, Verdict};
 use elbowroom_execution::{ActionValues, PlanAnswer, Planner};
 use elbowroom_laboratory::compare::{Experiment, Part, Results, run};
-use elbowroom_laboratory::timed::{Policy, Settings};
 use elbowroom_model::{Situation, Task};
 use elbowroom_num::Rational;
 use elbowroom_pddl::{Source, read_plan, read_problem};

@@ -15,9 +15,9 @@ use std::path::PathBuf;
 use std::process::Command;
 use std::sync::Arc;
 
-use elbowroom::export::prism::{Bound, timed, untimed};
+use elbowroom::mdp::{Settings, TimedOptimum, optimum};
+use elbowroom_export::prism::{Bound, timed, untimed};
 use elbowroom_laboratory::perturbed::PerturbedExperiment;
-use elbowroom_laboratory::timed::{Settings, TimedOptimum, optimum};
 use elbowroom_model::Task;
 use elbowroom_pddl::{Source, read_problem};
 use elbowroom_plan::PartialOrderPlan;

@@ -7,7 +7,7 @@ mod sets;
 #[path = "timed/twin.rs"]
 mod twin;
 
-use elbowroom_laboratory::timed::{Settings, Stop, TimedOptimum, optimum};
+use elbowroom::mdp::{Settings, Stop, TimedOptimum, optimum};
 use elbowroom_model::Task;
 use elbowroom_pddl::{Source, read_problem};
 use elbowroom_sim::WorldModel;

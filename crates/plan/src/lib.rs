@@ -42,15 +42,19 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod box_text;
 mod decoupled_envelope;
 pub mod deorder;
+pub mod dot;
 mod durations;
 pub mod format;
+pub mod makespan;
 mod network;
 mod numbers;
 mod parameter;
 pub mod parametrize;
 pub mod partial_order;
+mod plan_file;
 mod stn_plan;
 #[cfg(test)]
 mod testing;
@@ -64,5 +68,6 @@ pub use elbowroom_num::Side;
 pub use network::{Origin, Schedule, network_node};
 pub use parameter::{Parameter, ParameterKind, ParametrizedPlan};
 pub use partial_order::{Link, LinkKind, PartialOrderPlan};
+pub use plan_file::{AnyPlan, PlanKind};
 pub use stn_plan::{Bound, Constraint, Instance, InstanceId, Node, NodeId, Reason, StnPlan};
 pub use valuation::{ParameterId, Valuation};

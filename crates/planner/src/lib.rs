@@ -2,7 +2,8 @@
 //!
 //! It reads no clock, no file and no random number. The caller decides, every few milliseconds,
 //! whether to continue. The same task gives the same plan, for any number of threads
-//! ([`Settings::threads`]). The crate `elbowroom-external` runs other planners.
+//! ([`Settings::threads`]). The crate `elbowroom-external` runs other planners. [`no_plan`] computes
+//! certificates that no plan exists.
 //!
 //! ```
 //! use std::ops::ControlFlow;
@@ -39,6 +40,7 @@
 //! ```
 
 pub mod embedded;
+pub mod no_plan;
 
 pub use embedded::{
     Answer, Counts, FoundPlan, Member, Objective, Phase, Progress, Proof, Settings, Stopped,

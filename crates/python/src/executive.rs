@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use elbowroom::execution::{ActionHandle, Request};
-use elbowroom::executive::documents::{GivenNumber, NewGoal};
+use elbowroom_executive::interface::documents::{GivenNumber, NewGoal};
 use elbowroom_executive::journal::Segments;
 use elbowroom_executive::request_queue::{ExternalRequest, RequestStatus};
 use elbowroom_executive::run::JournaledOutcome;

@@ -5,12 +5,15 @@ use std::io::{self, ErrorKind};
 use std::time::Duration;
 
 use elbowroom::answers::exact::{INFINITY, MINUS_INFINITY};
-use elbowroom::executive::documents::{
+use elbowroom::num::work::Stop;
+use elbowroom::num::{End, Rational};
+use elbowroom::report::exact::Exact;
+use elbowroom_executive::http::{self, AccessControl};
+use elbowroom_executive::interface::documents::{
     GivenNumber, GoalNow, GoalsNow, GuaranteeNow, NewFact, NewGoal, NewNumber, NewOutcome,
     NewProblem, NextNow, PlanNow, Refusal, State, StepNow, Taken,
 };
-use elbowroom::num::{End, Rational};
-use elbowroom::report::exact::Exact;
+use elbowroom_executive::messages::{count_with_noun, escape_control, io_error_message};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -21,9 +24,6 @@ use crate::number::nearest;
 use crate::output::{self, Output};
 use crate::terminal::{EMPHASIS, TextLayout, styled};
 use crate::wrap::wrap;
-use elbowroom::num::work::Stop;
-use elbowroom_executive::http::{self, AccessControl};
-use elbowroom_executive::messages::{count_with_noun, escape_control, io_error_message};
 
 /// Sends the request and prints the answer.
 pub(crate) fn run(arguments: &CtlArgs, output: &mut Output) -> Answer {

@@ -8,12 +8,12 @@ use std::sync::Arc;
 use elbowroom::RoundingRule;
 use elbowroom::answers::{EnvelopeAnswer, EnvelopeRequest};
 use elbowroom::envelope::Guarantee;
-use elbowroom::export::{self, ExportError};
 use elbowroom::model::Task;
 use elbowroom::network::{NetworkFile, write_graphml, write_json, write_plain};
 use elbowroom::parse_box;
 use elbowroom::pipeline::PipelineError;
 use elbowroom::plan::{DecoupledEnvelope, ParametrizedPlan};
+use elbowroom_export::{self as export, ExportError};
 
 use crate::args::{self, ExportArgs, ExportFormat};
 use crate::commands::envelope::specifications;

@@ -4,7 +4,6 @@ mod answer;
 mod answer_builder;
 mod best;
 mod binding_constraints;
-mod box_search;
 mod certificate;
 mod conditions;
 mod inequalities;
@@ -18,20 +17,22 @@ mod value_of_information;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use elbowroom_envelope::explain::{Explainer, Explanation};
 use elbowroom_envelope::obligations::Refusal;
-use elbowroom_envelope::{BestSettings, Growth, Guarantee, Method, Objective, Oracle};
+use elbowroom_envelope::{Guarantee, Method, Objective, Oracle};
 use elbowroom_execution::run::TimeoutRule;
 use elbowroom_model::Task;
-use elbowroom_num::Rational;
 use elbowroom_plan::deorder::DeorderError;
 use elbowroom_plan::parametrize::VarySpec;
 use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan};
+use elbowroom_selection::timeouts::unknown_action;
 use elbowroom_sim::WorldModel;
 
 use super::{Observer, RequestError, StopRequest};
-use crate::explain::{Explainer, Explanation};
 use crate::pipeline::{self, PipelineError};
 use crate::{AnyPlan, parse_box};
+
+pub use elbowroom_selection::Search;
 
 pub use answer::{
     ActionTimes, ChosenDuration, Counterexample, EnvelopeAnswer, EnvelopeFinding, EnvelopeFormat,
@@ -40,12 +41,10 @@ pub use answer::{
 };
 pub(crate) use answer_builder::quantities;
 pub use best::{Best, Probability};
-pub(crate) use box_search::grow;
 pub use conditions::Conditions;
 pub use inequalities::{Inequalities, NetworkRow, RequirementRow};
 pub use shadow_prices::{Relax, ShadowPrices};
 pub use timeline::Timeline;
-pub(crate) use timeouts::{PlannedTimeout, unknown_action};
 pub use uniform_slack::{Deviation, UniformSlack};
 pub use value_of_information::ValueOfInformation;
 
@@ -79,10 +78,6 @@ pub struct EnvelopeRequest {
     pub world: Option<Arc<WorldModel>>,
 }
 
-/// Number of examined parameters before long conflicts are divided
-/// ([`divide_after`](elbowroom_envelope::Settings::divide_after)). Plans of a thousand actions hardly reach it.
-const DIVIDE_AFTER: usize = 50_000;
-
 /// IRR was requested with an objective, which only the largest box has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("IRR has no objective")]
@@ -102,101 +97,6 @@ pub fn objective_of(
         (Some(Method::Irr), None) => Ok(None),
         (None, None) if has_precision => Ok(None),
         (_, objective) => Ok(Some(objective.unwrap_or_default())),
-    }
-}
-
-/// Settings of the search for an envelope.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Search {
-    /// The algorithm; by default the one that [`method_for`](Self::method_for) returns.
-    pub method: Option<Method>,
-    /// Step size below which the search ends; positive.
-    pub precision: Rational,
-    /// Alternative to `precision`: the precision of each parameter as a share of its nominal value.
-    pub relative: Option<Rational>,
-    /// Change of step sizes after a success.
-    pub growth: Growth,
-    /// `true` if each end is moved onto its limit after the search.
-    pub sharpen: bool,
-    /// Maximum number of box checks.
-    pub most_checks: Option<usize>,
-    /// Settings of [`Method::Best`].
-    pub best: BestSettings,
-}
-
-impl Default for Search {
-    /// Returns the settings of the search for the box with the greatest least slack. The search
-    /// begins with IRR: precision a hundredth of each nominal value, doubling steps, no sharpening
-    /// and no limit.
-    fn default() -> Self {
-        let settings = elbowroom_envelope::Settings::default();
-        Self {
-            method: None,
-            precision: settings.precision,
-            relative: Some(Rational::new(1, 100)),
-            growth: settings.growth,
-            sharpen: false,
-            most_checks: settings.most_checks,
-            best: BestSettings::default(),
-        }
-    }
-}
-
-impl Search {
-    /// Returns the settings of the search for the largest box by this objective.
-    pub fn best(objective: Objective) -> Self {
-        let mut search = Self {
-            method: Some(Method::Best),
-            ..Self::default()
-        };
-        search.best.objective = objective;
-        search
-    }
-
-    /// Returns the settings of IRR, the algorithm of paper 1.
-    pub fn irr() -> Self {
-        Self {
-            method: Some(Method::Irr),
-            ..Self::default()
-        }
-    }
-
-    /// Sets this precision for all parameters, in the unit of the plan.
-    #[must_use]
-    pub fn with_precision(mut self, precision: Rational) -> Self {
-        self.precision = precision;
-        self.relative = None;
-        self
-    }
-
-    /// Returns the method for the plans of a problem. The default is the largest box. It is IRR if
-    /// the settings have a precision, steps that do not double, or sharpened ends, which only IRR
-    /// supports, and for problems with processes or events, for whose boxes nothing can be proved.
-    pub fn method_for(&self, task: &Task) -> Method {
-        if let Some(method) = self.method {
-            return method;
-        }
-        let usual = Self::default();
-        let is_for_irr = self.relative != usual.relative
-            || self.precision != usual.precision
-            || self.growth != usual.growth
-            || self.sharpen;
-        if is_for_irr || task.unsupported_by_analysis().is_some() {
-            Method::Irr
-        } else {
-            Method::Best
-        }
-    }
-
-    /// Returns the settings of IRR.
-    pub fn settings(&self) -> elbowroom_envelope::Settings {
-        elbowroom_envelope::Settings {
-            precision: self.precision.clone(),
-            relative: self.relative.clone(),
-            growth: self.growth,
-            most_checks: self.most_checks,
-            divide_after: Some(DIVIDE_AFTER),
-        }
     }
 }
 
@@ -360,7 +260,7 @@ pub fn partial_result(
 /// # Errors
 /// When the validator rejects the plan, the request names things that the plan does not have, or
 /// the problem has processes or events.
-pub(crate) fn parametrized_plan(
+pub fn parametrized_plan(
     request: &EnvelopeRequest,
 ) -> Result<(ParametrizedPlan, usize), PipelineError> {
     match request.task.unsupported_by_analysis() {

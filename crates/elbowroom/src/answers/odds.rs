@@ -18,12 +18,12 @@ use elbowroom_probability::{
     Likelihoods, Model, OrderSearch, SearchSettings, SearchState, SearchStop, Semantics,
     TotalOrderPlan,
 };
+use elbowroom_selection::with_fixed_durations;
 use elbowroom_sim::WorldModel;
 use serde::{Deserialize, Serialize};
 
 use super::{Observer, RequestError, Version, ViolationAnswer};
 use crate::execute::Embedded;
-use crate::execute::with_fixed_durations;
 
 pub use executed::{EndAnswer, ExecutedAnswer};
 pub use improvements::{BestOrderAnswer, ImprovementsAnswer, ValueAnswer};

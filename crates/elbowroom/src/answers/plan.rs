@@ -11,14 +11,14 @@ use std::time::Duration;
 use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 use elbowroom_planner::{Answer, Counts, FoundPlan, Progress, Settings, Stopped};
+use elbowroom_selection::exhausted;
 use elbowroom_verify::no_plan::NoPlan;
 use serde::{Deserialize, Serialize};
 
 use super::{Event, Exact, Observer, PlanProgress, RequestError, StopRequest, Version, exact};
-use crate::execute::exhausted;
 use crate::plan_text;
 
-pub use crate::no_plan::no_plan_certificate_from;
+pub use elbowroom_planner::no_plan::no_plan_certificate_from;
 pub use external::{PlannerFailure, plan_with};
 pub use improving::{BetterPlan, ImprovingPlans, ImprovingPlansRequest, NextPlan};
 pub use objective::{

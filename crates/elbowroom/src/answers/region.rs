@@ -7,6 +7,8 @@ mod sampling;
 
 use std::fmt::Write as _;
 
+use elbowroom_envelope::explain::Explainer;
+use elbowroom_envelope::linear_form::LinearForm;
 use elbowroom_envelope::obligations::{Refusal, Requirement};
 use elbowroom_envelope::{ExactError, RegionRow, RegionSource, exact as exact_region};
 use elbowroom_num::Rational;
@@ -16,8 +18,6 @@ use serde::{Deserialize, Serialize};
 
 use super::envelope::{self, Inequalities, Quantity, Timeline, quantities};
 use super::{EnvelopeRequest, Exact, Observer, RequestError, Version, ViolationAnswer, exact};
-use crate::explain::Explainer;
-use crate::linear_form::LinearForm;
 use crate::pipeline::PipelineError;
 
 pub use boxes::{BoxAnswer, IntervalAnswer};

@@ -7,6 +7,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use elbowroom_envelope::obligations::Refusal;
+use elbowroom_envelope::pinning;
 use elbowroom_envelope::{
     Guarantee, Oracle, Repair, RepairLimits, RepairRun, repair as cheapest, with_obligations,
 };
@@ -18,8 +19,8 @@ use serde::{Deserialize, Serialize};
 
 use super::plan::PlanStep;
 use super::{Exact, Observer, RequestError, StopRequest, Version, exact};
+use crate::AnyPlan;
 use crate::pipeline::{self, PipelineError};
-use crate::{AnyPlan, pinning};
 use subject::Subject;
 
 /// Work limit of a search through other orders, in linear programs times the square of the number

@@ -3,9 +3,8 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use elbowroom::executive::documents::{Activity, GoalsNow, State};
-
 use super::router::ApiRouter;
+use crate::interface::documents::{Activity, GoalsNow, State};
 
 /// States of goals, as `GET /v1/goals` has them.
 const GOAL_STATES: [&str; 9] = [

@@ -6,10 +6,6 @@ use std::time::Duration;
 
 use elbowroom::execution::run::PROBLEM_GOAL_NAME;
 use elbowroom::execution::{ActionHandle, GoalTerms, Request};
-use elbowroom::executive::documents::{
-    Activity, NewFact, NewGoal, NewNumber, NewOutcome, NewProblem, State, Taken,
-};
-use elbowroom::executive::goal_text;
 use elbowroom::model::ground::{Change, FactId};
 use elbowroom::model::{Problem, Task};
 use elbowroom::pddl::{self, Source};
@@ -17,6 +13,10 @@ use serde::de::DeserializeOwned;
 
 use super::router::{Accepted, ApiError, ApiRouter, ServedRun};
 use crate::error::Error;
+use crate::interface::documents::{
+    Activity, NewFact, NewGoal, NewNumber, NewOutcome, NewProblem, State, Taken,
+};
+use crate::interface::goal_text;
 use crate::messages::count_with_noun;
 use crate::request_check::{check, check_target};
 use crate::request_queue::{ExternalRequest, RequestStatus};

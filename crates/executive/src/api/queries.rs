@@ -1,9 +1,9 @@
 //! Queries of the state of an executive.
 
-use elbowroom::executive::documents::{Activity, State};
 use elbowroom::num::Rational;
 
 use super::router::ApiRouter;
+use crate::interface::documents::{Activity, State};
 
 impl ApiRouter {
     /// Returns the state of the executive.

@@ -6,23 +6,22 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
 use elbowroom::execute::{NamedText, RunSpec};
-use elbowroom::executive::documents::Refusal;
-use elbowroom::executive::{METHODS, Status, openapi};
 use elbowroom::model::Task;
 use elbowroom::report::trace::TraceWriter;
 use serde::Serialize;
 
+use super::initial_problem::InitialProblem;
+use super::state_stream::DocumentCache;
 use crate::error::Error;
 use crate::goal_request::GoalNames;
 use crate::http::{
     AccessControl, Request, RequestError, Stream, is_local_name, respond, respond_with_events,
 };
+use crate::interface::documents::Refusal;
+use crate::interface::{METHODS, Status, openapi};
 use crate::operator::OperatorInterface;
 use crate::request_queue::RequestQueue;
 use crate::trace_buffer::TraceBuffer;
-
-use super::initial_problem::InitialProblem;
-use super::state_stream::DocumentCache;
 
 const JSON: &str = "application/json";
 const TEXT: &str = "text/plain; charset=utf-8";

@@ -7,13 +7,13 @@ use std::thread;
 use std::time::Duration;
 
 use elbowroom::answers::envelope::timeline;
-use elbowroom::executive::documents::PlanNow;
 use elbowroom_page::lanes_of_actions;
 use serde_json::{Map, Value, json};
 
 use super::router::{ApiRouter, ServedRun};
 use crate::clock::Clock;
 use crate::http::Stream;
+use crate::interface::documents::PlanNow;
 use crate::trace_buffer::Subscriber as _;
 
 /// Least time between two messages.

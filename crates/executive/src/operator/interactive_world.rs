@@ -5,7 +5,6 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use elbowroom::execution::{Command, Event, Observation, TimeAdvance, World, WorldError};
-use elbowroom::executive::Status;
 use elbowroom::model::Task;
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
@@ -15,6 +14,7 @@ use super::OperatorInterface;
 use super::throttle::SimulationThrottle;
 use crate::clock::Clock;
 use crate::completion_signal::{Completion, CompletionSignal};
+use crate::interface::Status;
 use crate::request_queue::RequestQueue;
 
 /// Number of polls for a completed background task per second.

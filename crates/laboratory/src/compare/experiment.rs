@@ -5,7 +5,7 @@ mod file;
 use elbowroom::answers::envelope::objective_of;
 use elbowroom::envelope::Objective;
 use elbowroom::execute::{FirstPlan, MOST_STATES, PLANNING_BUDGET};
-use elbowroom::timed::Settings;
+use elbowroom::mdp::Settings;
 use elbowroom_execution::executors::ExecutorSpec;
 use elbowroom_execution::run::{RunSettings, TimeoutRule};
 use elbowroom_num::Rational;

@@ -1,4 +1,4 @@
-//! Row of the optimal policy: see [`timed`](crate::timed).
+//! Row of the optimal policy: see [`mdp`](elbowroom::mdp).
 
 use elbowroom::execute::ActionSets;
 use rayon::prelude::*;
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::trials::Setting;
 use super::{Column, Experiment, ExperimentError, Part, threads_per_piece};
-use crate::timed::{Settings, optimum};
+use elbowroom::mdp::{Settings, optimum};
 
 /// Name of the row.
 pub(super) const ROW: &str = "optimum without foresight";

@@ -19,7 +19,7 @@ use elbowroom::execute::{
     PlanSelector, Replanning, RolloutPolicy, Rollouts, SharedMostProbablePlanner,
     SharedRolloutPolicy, WorldKnowledge,
 };
-use elbowroom::timed::{Policy, Settings};
+use elbowroom::mdp::{Policy, Settings};
 
 /// Column for one problem.
 pub(super) struct Scenario {

@@ -1,6 +1,6 @@
 //! The bounds of small worlds enclose the values of a plain recursion.
 
-use elbowroom_laboratory::timed::{Settings, TimedOptimum};
+use elbowroom::mdp::{Settings, TimedOptimum};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 

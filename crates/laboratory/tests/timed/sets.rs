@@ -1,7 +1,7 @@
 //! Sets of actions for recovery after the failure of a plan.
 
 use elbowroom::execute::{ActionSets, Embedded};
-use elbowroom_laboratory::timed::{Settings, optimum, supported};
+use elbowroom::mdp::{Settings, optimum, supported};
 use elbowroom_sim::WorldModel;
 
 use super::task;

@@ -3,9 +3,9 @@
 
 use std::sync::Arc;
 
-use elbowroom::export::prism::{self, PrismError};
+use elbowroom::mdp;
 use elbowroom::probability::{likelihoods, optimum};
-use elbowroom::timed;
+use elbowroom_export::prism::{self, PrismError};
 
 use crate::args::{Bound, ExportArgs};
 use crate::exit::Failure;
@@ -72,7 +72,7 @@ pub(super) fn text(arguments: &ExportArgs, output: &mut Output) -> Result<String
             Some(Bound::Lower) => prism::Bound::Lower,
         };
         let grid = (process.cells.unwrap_or(CELLS), bound);
-        prism::timed(&task, &world, &timed::Settings::default(), grid)
+        prism::timed(&task, &world, &mdp::Settings::default(), grid)
     } else {
         unreachable!("one of the two was asked for above")
     };

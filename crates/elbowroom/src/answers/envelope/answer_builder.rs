@@ -1,21 +1,21 @@
 //! Conversion of the results of the search and the explainer into the parts of an answer.
 
 use elbowroom_envelope::Widening;
+use elbowroom_envelope::explain::{Explainer, Explanation, Shortfall};
 use elbowroom_num::{Interval, Rational};
+use elbowroom_plan::makespan::earliest_end;
 use elbowroom_plan::{
     DecoupledEnvelope, Node, NodeId, ParameterId, ParameterKind, ParametrizedPlan, Schedule, Side,
     Valuation,
 };
+use elbowroom_selection::timeouts::timeouts;
 
 use super::Subject;
 use super::answer::{
     ActionTimes, ChosenDuration, Counterexample, LimitedRange, Makespans, MovedEnd, Quantity,
     QuantityKind, Range, Stop, WideningStep,
 };
-use super::timeouts::timeouts;
 use crate::answers::{Exact, StopRequest};
-use crate::explain::{Explainer, Explanation, Shortfall};
-use crate::makespan::earliest_end;
 
 impl From<StopRequest> for Stop {
     fn from(halt: StopRequest) -> Self {

@@ -1,5 +1,6 @@
 //! The limits of the ends of a box, in words.
 
+use elbowroom_envelope::explain::KnownConflicts;
 use elbowroom_envelope::{Limit, Method, Oracle, limits};
 use elbowroom_num::Rational;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope};
@@ -7,7 +8,6 @@ use elbowroom_plan::{BoxEnd, DecoupledEnvelope};
 use super::Subject;
 use super::search::continue_or_stop;
 use crate::answers::Observer;
-use crate::explain::KnownConflicts;
 
 /// A sharpened end is moved by the precision divided by this number to find its limit.
 const SHARPENING_DIVISOR: i64 = 1_000_000_000;

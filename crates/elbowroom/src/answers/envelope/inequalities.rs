@@ -3,15 +3,14 @@
 
 use std::fmt::Write as _;
 
+use elbowroom_envelope::explain::Explainer;
 use elbowroom_envelope::linear::Factor;
+use elbowroom_envelope::linear_form::{LinearForm, NetworkBound, inequality};
 use elbowroom_envelope::obligations::{BadCase, Inequality, Obligation, Requirement};
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
 use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan, Side};
 use serde::{Deserialize, Serialize};
-
-use crate::explain::Explainer;
-use crate::linear_form::{LinearForm, NetworkBound, inequality};
 
 /// Largest number of nodes of a plan whose inequalities are written.
 const MOST_TIMES: usize = 400;

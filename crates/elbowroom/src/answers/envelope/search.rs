@@ -5,11 +5,11 @@ use std::time::Duration;
 
 use elbowroom_envelope::{Oracle, StopReason, Widening, sharpen};
 use elbowroom_plan::DecoupledEnvelope;
+use elbowroom_selection::box_search::{Step, grow};
 
 use super::answer::{EnvelopeFinding, Makespans, Stop, WideningStep};
 use super::best::best;
 use super::binding_constraints::limits_of_ends;
-use super::box_search::{Step, grow};
 use super::conditions::Conditions;
 use super::timeline::Timeline;
 use super::uniform_slack::uniform_slack;

@@ -2,9 +2,11 @@
 
 use std::collections::BTreeMap;
 
+use elbowroom_envelope::linear_form::relaxed;
 use elbowroom_model::Task;
 use elbowroom_model::ground::Change;
 use elbowroom_num::Rational;
+use elbowroom_plan::makespan::with_fixed_choices;
 use elbowroom_plan::{
     DecoupledEnvelope, Node, NodeId, ParameterKind, ParametrizedPlan, network_node,
 };
@@ -13,8 +15,6 @@ use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
 use crate::answers::Exact;
-use crate::linear_form::relaxed;
-use crate::makespan::with_fixed_choices;
 
 /// The times of a plan, for a chart.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

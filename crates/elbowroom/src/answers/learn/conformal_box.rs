@@ -3,6 +3,7 @@
 
 use std::sync::Arc;
 
+use elbowroom_envelope::explain::Explainer;
 use elbowroom_envelope::{Guarantee, Oracle};
 use elbowroom_learning::conformal::{Band, allotment, factor, min_samples};
 use elbowroom_learning::learn::Learnt;
@@ -15,7 +16,6 @@ use serde::{Deserialize, Serialize};
 use crate::AnyPlan;
 use crate::answers::envelope::{EnvelopeRequest, envelope};
 use crate::answers::{Observer, RequestError, exact};
-use crate::explain::Explainer;
 use crate::pipeline::PipelineError;
 
 /// Requests intervals that contain all durations of the next execution of a plan at once, with a

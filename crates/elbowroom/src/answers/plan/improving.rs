@@ -10,10 +10,10 @@ use std::thread::{Builder, JoinHandle};
 use std::time::Duration;
 
 use elbowroom_model::{Task, TimeTriggeredPlan};
+use elbowroom_selection::renumbered;
 
 use super::{PlanFinding, PlanOutcome, PlanRequest, plan};
 use crate::answers::{Event, Observer, RequestError, StopRequest};
-use crate::execute::renumbered;
 
 /// Stack size of the search thread: that of the main thread.
 const STACK_SIZE: usize = 64 << 20;

@@ -1,12 +1,12 @@
 //! A planner's claim that there is no plan: proved, or reported as a search without a result.
 
 use elbowroom_model::{Situation, Task};
+use elbowroom_planner::no_plan::{Effort, fluents_without_value, no_plan_certificate_within};
 use elbowroom_planner::{Counts, Proof};
+use elbowroom_selection::WITHOUT_SELF_OVERLAP;
 use elbowroom_verify::no_plan::NoPlan;
 
 use super::{PlanAnswer, PlanFinding, PlanStop, SearchMonitor};
-use crate::execute::WITHOUT_SELF_OVERLAP;
-use crate::no_plan::{Effort, fluents_without_value, no_plan_certificate_within};
 
 /// Work limit for the certificate of an answer: about a minute.
 const MOST_WORK: u64 = 500_000_000;

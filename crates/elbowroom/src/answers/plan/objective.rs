@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
+use elbowroom_plan::makespan::last_end;
 use elbowroom_planner::{Answer, Settings};
 use elbowroom_sim::WorldModel;
 use serde::{Deserialize, Serialize};
@@ -16,7 +17,6 @@ use serde::{Deserialize, Serialize};
 use super::{PlanFinding, PlanOutcome, PlanStop, SearchMonitor, no_plan_reason};
 use crate::answers::{Event, Exact, Observer, PlanProgress, RequestError, exact};
 use crate::execute::{Candidates, Limits};
-use crate::makespan::last_end;
 use crate::pipeline;
 use evaluation::{EvaluatedPlan, PlanEvaluator};
 
@@ -232,7 +232,7 @@ pub fn best_plan(
     };
     let stop = ended.unwrap_or(stop);
     let answer = course.answer(request.task, (finding, choice), (stop, counts));
-    let plan = plan.and_then(|plan| crate::execute::renumbered(request.task, &plan));
+    let plan = plan.and_then(|plan| elbowroom_selection::renumbered(request.task, &plan));
     Ok(PlanOutcome { answer, plan })
 }
 

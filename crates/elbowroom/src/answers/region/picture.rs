@@ -4,17 +4,17 @@ use std::ops::ControlFlow;
 
 use elbowroom_envelope::{ExactError, Polygon};
 use elbowroom_num::Rational;
+use elbowroom_plan::box_text::{self, BoxTextError};
 use elbowroom_plan::{ParameterId, ParametrizedPlan};
 use elbowroom_report::plane::PlanePicture;
 
 use super::{RegionFinding, RegionOutcome};
-use crate::box_text::{self, BoxTextError};
 
 /// Selection of a picture of a region.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Plane {
     /// The horizontal and the vertical parameter, named as in boxes
-    /// ([`parse_box`](crate::box_text::parse_box)).
+    /// ([`parse_box`](elbowroom_plan::box_text::parse_box)).
     pub axes: [String; 2],
     /// Values of the other parameters.
     pub others: Others,

@@ -1,5 +1,6 @@
 //! Descriptions of repairs in words.
 
+use elbowroom_envelope::explain::Explainer;
 use elbowroom_envelope::obligations::Requirement;
 use elbowroom_envelope::{BindingConstraint, Repair};
 use elbowroom_model::ground::{Change as Effect, Condition};
@@ -8,7 +9,6 @@ use elbowroom_plan::{Bound, Constraint, Node, NodeId, ParameterId, Side, Valuati
 
 use super::Change;
 use super::subject::Subject;
-use crate::explain::Explainer;
 
 /// Number of digits of numbers in descriptions.
 const DIGITS: u32 = 6;

@@ -10,22 +10,22 @@ use elbowroom_execution::{
     ActionValues, NoPlanner, PlanComparator, PlanForm, Planner, PrepareError, Preparer, World,
 };
 use elbowroom_external::{self as external, PlannerError};
+use elbowroom_mdp::{Policy, Settings};
 use elbowroom_model::problem::Problem;
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::{Rational, work};
 use elbowroom_planner::embedded;
 use elbowroom_probability::Likelihoods;
+use elbowroom_selection::timeouts::unknown_action;
 use elbowroom_sim::{ControlledWorld, SimWorld, WorldModel};
 use elbowroom_text::Diagnostics;
 
 use super::{EMBEDDED, NO_PLANNER, RunSpec};
-use crate::answers::envelope::unknown_action;
 use crate::execute::{
     ActionSets, AdversarialWorld, Embedded, Execution, External, FirstPlan, MostProbablePlanner,
     PlanPreparer, PlanSelector, Replanning, RolloutPolicy, Rollouts, SelectingPlanner,
     SharedRolloutPolicy, WorldKnowledge, planning_work,
 };
-use crate::timed::{Policy, Settings};
 use crate::{BoxTextError, DistributionError, parse_box, pipeline};
 
 /// The time limit of another planner for its first plan.

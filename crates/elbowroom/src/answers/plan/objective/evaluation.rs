@@ -8,6 +8,7 @@ use elbowroom_execution::executors::ExecutorSpec;
 use elbowroom_execution::run::RunSettings;
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
+use elbowroom_plan::makespan::last_end;
 use elbowroom_probability::Likelihoods;
 use elbowroom_report::statistics::Proportion;
 
@@ -16,7 +17,6 @@ use crate::answers::envelope::{EnvelopeFinding, EnvelopeRequest, Search, envelop
 use crate::answers::plan::SearchMonitor;
 use crate::answers::{Observer, RequestError, StopRequest};
 use crate::execute::{Candidate, RolloutSession, Rollouts};
-use crate::makespan::last_end;
 use crate::pipeline;
 
 /// Number of samples after each round. A plan that is significantly behind the best one gets no
@@ -193,7 +193,7 @@ fn samples(
             }
             results.push(tryout.succeeds(plan, sample));
         }
-        if crate::execute::is_behind(&results, best) {
+        if elbowroom_selection::is_behind(&results, best) {
             break;
         }
     }

@@ -1,0 +1,164 @@
+//! Failures of actions, and their outcomes.
+
+use elbowroom_sim::{FactOutcome, FailureRule, FailureTime, Outcome, WorldModel};
+
+use super::NotTabulated;
+use super::action_model::{ActionModel, Snap};
+use super::compile::Compiler;
+use super::world::Facts;
+
+/// An outcome of a failure.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FailureKind {
+    /// Conditional probability of this outcome, given that the action fails.
+    pub(crate) share: f64,
+    /// The added facts, without deleted ones.
+    pub adds: Facts,
+    /// The deleted facts.
+    pub deletes: Facts,
+    /// Time for which the failed action is still running and cannot be cancelled, in seconds.
+    pub delay: f64,
+}
+
+/// The end of an action.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(super) enum Ending {
+    /// Success, with this draw of the amounts.
+    Success(u16),
+    /// Failure, with this outcome.
+    Failure(u8),
+}
+
+impl FailureKind {
+    pub(super) fn apply(&self, facts: Facts) -> Facts {
+        (facts & !self.deletes) | self.adds
+    }
+}
+
+impl ActionModel {
+    /// Returns all facts that a failure may make true.
+    pub(super) fn adds_by_failing(&self) -> Facts {
+        let failures = self.failures.iter();
+        failures.fold(0, |all, failed| all | failed.adds)
+    }
+
+    /// Returns all facts that a failure may make false.
+    pub(super) fn deletes_by_failing(&self) -> Facts {
+        let failures = self.failures.iter();
+        failures.fold(0, |all, failed| all | failed.deletes)
+    }
+
+    /// Returns the outcome of the failure, if it is one.
+    pub(super) fn failed(&self, ending: Ending) -> Option<&FailureKind> {
+        match ending {
+            Ending::Success(_) => None,
+            Ending::Failure(way) => self.failures.get(usize::from(way)),
+        }
+    }
+
+    /// Returns `true` if it may have failed already while it is still running, so that it cannot be
+    /// cancelled.
+    pub(super) fn can_delay_its_failure(&self) -> bool {
+        self.failures.iter().any(|failed| failed.delay > 0.0)
+    }
+}
+
+/// Maximum number of outcomes of an action's failures.
+const MOST_WAYS: usize = 64;
+
+impl Compiler<'_> {
+    /// Returns the distinct outcomes of an action's failures.
+    pub(super) fn failures(
+        &self,
+        name: &str,
+        model: &WorldModel,
+        start: &Snap,
+        takes_time: bool,
+    ) -> Result<Vec<FailureKind>, NotTabulated> {
+        let refuse = |what: &str| Err(NotTabulated::new(format!("{name} has {what}")));
+        let mut ways: Vec<FailureKind> = Vec::new();
+        let Some(failing) = model.failure_rule(name) else {
+            return Ok(ways);
+        };
+        let is_at_start = failing.when == FailureTime::AtStart || !takes_time;
+        if is_at_start && !failing.outcomes.is_empty() {
+            return refuse("a start that fails with outcomes");
+        }
+        let mut rest = 1.0;
+        for outcome in &failing.outcomes {
+            if !outcome.is_reported {
+                return refuse("failures with outcomes that are not reported");
+            }
+            let Some((adds, deletes)) =
+                self.facts_after_failure(name, failing, Some(outcome), start)
+            else {
+                return refuse("failures with outcomes that change numbers");
+            };
+            rest -= outcome.probability;
+            let delay = outcome.delay.to_f64();
+            add(&mut ways, outcome.probability, (adds, deletes), delay);
+        }
+        let undone = self.facts_after_failure(name, failing, None, start);
+        // Decimal fractions may not add up to exactly 1 in binary.
+        if rest > 1e-9 {
+            add(&mut ways, rest, undone.unwrap_or_default(), 0.0);
+        }
+        if ways.len() > MOST_WAYS {
+            return refuse(&format!(
+                "{} different outcomes of its failures, more than the limit of {MOST_WAYS}",
+                ways.len()
+            ));
+        }
+        let sum: f64 = ways.iter().map(|way| way.share).sum();
+        for way in &mut ways {
+            way.share /= sum;
+        }
+        Ok(ways)
+    }
+
+    /// Returns the facts that a failure makes true and false; `None` if it changes numbers.
+    fn facts_after_failure(
+        &self,
+        name: &str,
+        failing: &FailureRule,
+        outcome: Option<&Outcome>,
+        start: &Snap,
+    ) -> Option<(Facts, Facts)> {
+        let (mut adds, mut deletes) = if failing.is_undone {
+            (start.deletes & !start.adds, start.adds)
+        } else {
+            (0, 0)
+        };
+        for change in outcome.iter().flat_map(|outcome| &outcome.changes) {
+            let FactOutcome::Truth(truth) = change.change else {
+                return None;
+            };
+            let fact = self.task.fact_named(&change.target.instantiate(name));
+            let bit = fact.map_or(0, |fact| self.bit(fact));
+            (adds, deletes) = if truth {
+                (adds | bit, deletes & !bit)
+            } else {
+                (adds & !bit, deletes | bit)
+            };
+        }
+        Some((adds, deletes))
+    }
+}
+
+fn add(ways: &mut Vec<FailureKind>, share: f64, (adds, deletes): (Facts, Facts), delay: f64) {
+    if share <= 0.0 {
+        return;
+    }
+    let is_same = |way: &&mut FailureKind| {
+        (way.adds, way.deletes, way.delay.to_bits()) == (adds, deletes, delay.to_bits())
+    };
+    match ways.iter_mut().find(is_same) {
+        Some(way) => way.share += share,
+        None => ways.push(FailureKind {
+            share,
+            adds,
+            deletes,
+            delay,
+        }),
+    }
+}

@@ -1,0 +1,164 @@
+//! Sets of actions of different plans, for bounds from plans.
+
+use std::sync::Arc;
+
+use elbowroom_execution::executors::ExecutorSpec;
+use elbowroom_execution::run::{PlanningTime, RunSettings};
+use elbowroom_mdp::Settings;
+use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
+use elbowroom_num::Rational;
+use elbowroom_sim::WorldModel;
+use indexmap::IndexMap;
+
+use crate::box_search::EnvelopeSettings;
+use crate::candidates::{Candidates, Limits};
+use crate::planners::Embedded;
+use crate::rollouts::{Replanning, RolloutSession, Rollouts};
+
+/// Maximum number of plans.
+const MOST_PLANS: usize = 8;
+
+/// Maximum number of variants of the problem, and of states for all plans but the first.
+const MOST_SEARCHES: usize = 8;
+const MOST_VARIANT_STATES: u64 = 10_000;
+
+/// Number of samples of the first plan to find fallbacks; maximum number of states for all later
+/// plans; maximum number of fallbacks.
+const SAMPLES: u64 = 24;
+const MOST_FALLBACK_STATES: u64 = 10_000;
+const MOST_FALLBACKS: usize = 4;
+
+/// Sets of actions for restricted policies.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ActionSets {
+    /// Actions of different plans for the initial state, by the embedded planner, also for variants
+    /// with long durations and small amounts: [`Settings::plans`].
+    pub plans: Vec<Vec<String>>,
+    /// If everything happens at known times: actions of new plans after a failure of the first plan
+    /// in a sample of the world, with the supporting actions of the plans before:
+    /// [`Settings::fallbacks`].
+    pub fallbacks: Vec<Vec<String>>,
+}
+
+impl ActionSets {
+    /// Computes the sets for bounds on the success probability ([`elbowroom_mdp`]).
+    pub fn new(
+        task: &Task,
+        world: &WorldModel,
+        embedded: Embedded<'_>,
+        goes_on: &(dyn Fn() -> bool + Sync),
+    ) -> Self {
+        Self::of(task, world, embedded, &|_| true, goes_on)
+    }
+
+    /// Computes the sets for a [policy](elbowroom_mdp::Policy); empty if there would be no table even for
+    /// the first set.
+    pub fn for_policy(
+        task: &Task,
+        world: &WorldModel,
+        embedded: Embedded<'_>,
+        goes_on: &(dyn Fn() -> bool + Sync),
+    ) -> Self {
+        let is_of_use = |first: &[String]| {
+            let settings = Settings {
+                only: Some(first.to_vec()),
+                ..Settings::default()
+            };
+            elbowroom_mdp::is_supported(task, world, &settings)
+        };
+        Self::of(task, world, embedded, &is_of_use, goes_on)
+    }
+
+    fn of(
+        task: &Task,
+        world: &WorldModel,
+        embedded: Embedded<'_>,
+        is_of_use: &dyn Fn(&[String]) -> bool,
+        goes_on: &(dyn Fn() -> bool + Sync),
+    ) -> Self {
+        let limits = Limits {
+            most_states: embedded.most_states,
+            improve_states: embedded.improve_states,
+            other_states: MOST_VARIANT_STATES,
+            searches: MOST_SEARCHES,
+            work: embedded.work,
+            first_plan_factor: embedded.first_plan_factor,
+        };
+        // Planning must not add facts to the task's own table.
+        let thought = task.with_own_table();
+        let situation = Situation::initial(&thought);
+        let replanning = Replanning {
+            all_states: MOST_FALLBACK_STATES,
+            ..Replanning::within(&embedded)
+        };
+        let mut source =
+            Candidates::new(&thought, &situation, Some(world), embedded.settings, limits);
+        let mut next = || source.next(&mut |_| goes_on()).map(|found| found.plan);
+        let Some(first) = next().filter(|first| is_of_use(&names(first))) else {
+            return Self::default();
+        };
+        let others = std::iter::from_fn(next).take(MOST_PLANS - 1);
+        let mut plans = vec![names(&first)];
+        plans.extend(others.map(|plan| names(&plan)));
+        let fallbacks = if elbowroom_mdp::has_known_times(task, world) {
+            fallbacks(&thought, world, replanning, &first, goes_on)
+        } else {
+            Vec::new()
+        };
+        Self { plans, fallbacks }
+    }
+}
+
+/// Returns [`ActionSets::fallbacks`], the most frequent first.
+fn fallbacks(
+    task: &Task,
+    world: &WorldModel,
+    replanning: Replanning,
+    first: &TimeTriggeredPlan,
+    goes_on: &(dyn Fn() -> bool + Sync),
+) -> Vec<Vec<String>> {
+    let work = replanning.work;
+    let rollouts = Rollouts {
+        world: Arc::new(world.clone()),
+        // `guarded` replans at the first deviation, so more plans are found.
+        executor: "guarded"
+            .parse()
+            .unwrap_or_else(|_| ExecutorSpec::default()),
+        settings: RunSettings {
+            planning_time: PlanningTime::Seconds(Rational::ZERO),
+            ..RunSettings::default()
+        },
+        flow: EnvelopeSettings::default(),
+        likelihoods: Arc::default(),
+        replanning: Some(replanning),
+        is_ready: true,
+    };
+    let mut tryout = RolloutSession::new(task, rollouts, work, goes_on);
+    let mut found: IndexMap<Vec<String>, usize> = IndexMap::new();
+    for sample in 0..SAMPLES {
+        if !goes_on() {
+            break;
+        }
+        let mut before = names(first);
+        for plan in tryout.new_plans(first, sample) {
+            let own = names(&plan);
+            // A plan without new actions only continues the earlier plans.
+            if own.iter().any(|name| !before.contains(name))
+                && let Ok(mut set) = elbowroom_mdp::supported(task, world, &own, &before)
+            {
+                set.sort_unstable();
+                set.dedup();
+                *found.entry(set).or_default() += 1;
+            }
+            before.extend(own);
+        }
+    }
+    found.sort_by(|_, one, _, other| other.cmp(one));
+    found.into_keys().take(MOST_FALLBACKS).collect()
+}
+
+/// Returns the names of a plan's actions.
+fn names(plan: &TimeTriggeredPlan) -> Vec<String> {
+    let steps = plan.steps.iter();
+    steps.map(|step| step.action.name.clone()).collect()
+}
