@@ -1,8 +1,8 @@
-//! Runs whose executive, world or planner is killed at random moments, and which are continued with
-//! `--resume`.
+//! Runs whose executive, world or planner is killed after a random number of journal records, and which
+//! are continued with `--resume`.
 //!
 //! `ELBOWROOM_KILLS=1000 cargo test --workspace --test cli kills:: -- --nocapture` makes a thousand of
-//! them. The number of a run is the seed of the moments at which it is killed.
+//! them. The number of a run is the seed of these numbers.
 
 #![allow(
     clippy::print_stdout,
@@ -35,6 +35,9 @@ fn python_is_there() -> bool {
     }
     is_there
 }
+
+/// Maximum number of records between two kills. A run without kills writes about as many.
+const MAX_RECORDS: u64 = 40;
 
 /// Number of concurrent runs.
 const WORKERS: u8 = 4;
@@ -167,6 +170,25 @@ impl Victim {
     }
 }
 
+/// Returns the number of complete records of a journal.
+fn record_count(journal: &str) -> u64 {
+    let bytes = fs::read(journal).unwrap_or_default();
+    bytes.iter().map(|byte| u64::from(*byte == b'\n')).sum()
+}
+
+/// Waits until the journal has `count` records, or the run has ended.
+fn wait_for_records(child: &mut Child, journal: &str, count: u64) {
+    for _ in 0..60_000 {
+        let has_ended = child.try_wait().expect("it can be asked").is_some();
+        if has_ended || record_count(journal) >= count {
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let _ = child.kill();
+    panic!("the run is stuck before record {count}");
+}
+
 fn lines(folder: &Path, file: &str) -> Vec<String> {
     let text = fs::read_to_string(folder.join(file)).unwrap_or_default();
     text.lines().map(str::to_owned).collect()
@@ -225,21 +247,22 @@ fn killed(number: u64) -> u64 {
     let (mut kills, most) = (0, 1 + dice.below(3));
     let output = loop {
         // Without a first record, the run never began.
-        let has_begun = fs::read_to_string(&journal).is_ok_and(|text| text.contains('\n'));
+        let has_begun = record_count(&journal) > 0;
         let line = if has_begun {
             resume.to_vec()
         } else {
             let _ = fs::remove_file(&journal);
             beginning(&folder, &journal, has_planner)
         };
-        let what = format!("run {number} after {kills} kills");
+        let count = record_count(&journal) + dice.below(MAX_RECORDS);
+        let what = format!("run {number} after {kills} kills, before record {count}");
         let mut child = started(&line);
         if kills == most {
             break awaited(child, &what);
         }
         let victim = Victim::drawn(&mut dice, has_planner);
         if victim != Victim::Planner {
-            std::thread::sleep(Duration::from_millis(dice.below(2000)));
+            wait_for_records(&mut child, &journal, count);
         }
         victim.kill(&folder, &mut dice);
         kills += 1;

@@ -1,7 +1,7 @@
 //! Executives that are killed at random moments while goals are added and cancelled, also while
 //! their journals are rotated.
 //!
-//! `ELBOWROOM_SERVE_KILLS=100 cargo test --workspace --test cli executive::killed::whenever -- --nocapture` runs
+//! `ELBOWROOM_SERVE_KILLS=100 cargo test --workspace --test cli executive::killed -- --nocapture` runs
 //! a hundred of them. The number of an executive is the seed of the requests and of the moments at
 //! which it is killed.
 

@@ -14,7 +14,8 @@ use elbowroom_plan::{DecoupledEnvelope, format};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use crate::processes_and_events::{refuted, shared, task_of};
+use crate::processes_and_events::{refuted, task_of};
+use crate::shared;
 
 fn kettle(file: &str) -> (Arc<Task>, Source) {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../cases/kettle");
