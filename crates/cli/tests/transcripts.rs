@@ -1,4 +1,6 @@
 //! Runs the transcripts in `tests/cmd` and `docs/calendars.md`, which document the command.
+//!
+//! A program of its own, because it changes the current directory, which all tests of a program share.
 
 use std::path::Path;
 

@@ -11,7 +11,7 @@
 //! by the number of parameters. `many` is the complete answer of `elbowroom envelope`, with the
 //! limits of each end, for plans with up to a thousand parameters.
 
-#[path = "../tests/shared/mod.rs"]
+#[path = "../tests/elbowroom/shared/mod.rs"]
 mod shared;
 
 use std::ops::ControlFlow;

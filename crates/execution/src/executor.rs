@@ -110,11 +110,6 @@ pub trait Executor: Send {
     }
 }
 
-/// `true` if runs may use a real clock. In the module for browsers it is `false`, which
-/// keeps the module small: plans are not made in the background there, and the slack of running
-/// actions is not monitored.
-pub(crate) const SUPPORTS_REAL_CLOCK: bool = !cfg!(target_family = "wasm");
-
 /// The time window of a happening.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Planned {

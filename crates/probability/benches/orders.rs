@@ -2,7 +2,7 @@
 //!
 //! `cargo bench -p elbowroom-probability`
 
-#[path = "../tests/shared/mod.rs"]
+#[path = "../tests/probability/shared/mod.rs"]
 mod shared;
 
 use std::fmt::Write;

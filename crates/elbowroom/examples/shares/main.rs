@@ -26,7 +26,7 @@
     reason = "that is what the example does"
 )]
 
-#[path = "../../tests/shared/instances.rs"]
+#[path = "../../tests/elbowroom/shared/instances.rs"]
 mod instances;
 mod times;
 

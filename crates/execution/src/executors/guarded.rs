@@ -6,9 +6,8 @@ use elbowroom_plan::{Constraint, DecoupledEnvelope, InstanceId, Valuation};
 use super::{ExecutorEntry, guarantee_status};
 use crate::dispatch::{Dispatch, replan};
 use crate::executor::{
-    Decided, Decision, DecisionContext, Executor, Planned, PreparedPlan, StepId,
+    Decided, Decision, DecisionContext, Executor, PlanForm, Planned, PreparedPlan, StepId,
 };
-use crate::executor::{PlanForm, SUPPORTS_REAL_CLOCK};
 use crate::measured_amounts::{AmountEquation, amounts, duration_parameters};
 use crate::reason::{Cause, GuaranteeLevel, Reason, Subject};
 
@@ -119,8 +118,7 @@ impl Executor for Guarded {
     }
 
     fn bears_until(&self, step: StepId, now: &Rational) -> Option<Rational> {
-        let guard = self.state.as_ref().filter(|_| SUPPORTS_REAL_CLOCK)?;
-        guard.bears_until(step.instance(), now)
+        self.state.as_ref()?.bears_until(step.instance(), now)
     }
 
     fn fork(&self) -> Option<Box<dyn Executor>> {

@@ -20,9 +20,9 @@ use super::{ExecutorEntry, esterel, guarantee_status};
 use crate::dispatch::{Bounds, Dispatch, replan};
 use crate::event::Measured;
 use crate::executor::{
-    Decided, Decision, DecisionContext, Executor, PlanEvent, Planned, PreparedPlan, StepId,
+    Decided, Decision, DecisionContext, Executor, PlanEvent, PlanForm, Planned, PreparedPlan,
+    StepId,
 };
-use crate::executor::{PlanForm, SUPPORTS_REAL_CLOCK};
 use crate::measured_amounts::{MeasuredAmounts, amount_locations, amounts, duration_parameters};
 use crate::plan_comparison::{PlanComparator, RemainingPlan};
 use crate::preparation::RegionOracle;
@@ -180,10 +180,7 @@ impl Executor for Live {
 
     fn bears_until(&self, step: StepId, now: &Rational) -> Option<Rational> {
         let is_guaranteed = self.unguaranteed.is_none();
-        let rest = self
-            .state
-            .as_ref()
-            .filter(|_| SUPPORTS_REAL_CLOCK && is_guaranteed)?;
+        let rest = self.state.as_ref().filter(|_| is_guaranteed)?;
         rest.bears_until(step.instance(), now)
     }
 

@@ -14,7 +14,6 @@ use super::background_search::BackgroundSearch;
 use super::prediction::{ExpectedStart, LateActionAssumption, PredictedState, PredictionHorizon};
 use super::situation::OverrunEstimate;
 use crate::event::ActionHandle;
-use crate::executor::SUPPORTS_REAL_CLOCK;
 use crate::executor::StepId;
 use crate::request::Urgency;
 
@@ -111,7 +110,7 @@ impl Run<'_> {
 
     /// Updates the forecast if the execution deviates from it. Returns the time of the next check.
     pub(super) fn update_forecast(&mut self) -> Option<Rational> {
-        if !SUPPORTS_REAL_CLOCK || !self.settings.monitors_slack || self.search.is_some() {
+        if !self.settings.monitors_slack || self.search.is_some() {
             return None;
         }
         let Some(until) = self.next_need() else {
@@ -146,11 +145,7 @@ impl Run<'_> {
 
     /// Keeps the forecast when the present plan is abandoned, with the steps that were started.
     pub(super) fn keep_forecast(&mut self) {
-        if let Some(mut foreseen) = self
-            .anticipated_replan
-            .take()
-            .filter(|_| SUPPORTS_REAL_CLOCK)
-        {
+        if let Some(mut foreseen) = self.anticipated_replan.take() {
             if foreseen.abandoned.is_none() {
                 foreseen.abandoned = Some(AbandonedPlanState {
                     steps: self.action_log.steps().clone(),
@@ -167,10 +162,7 @@ impl Run<'_> {
         &mut self,
         guess: OverrunEstimate,
     ) -> Option<AnticipatedSituation> {
-        let foreseen = self
-            .anticipated_replan
-            .take()
-            .filter(|_| SUPPORTS_REAL_CLOCK)?;
+        let foreseen = self.anticipated_replan.take()?;
         let PredictedState {
             situation, running, ..
         } = &foreseen.prospect;

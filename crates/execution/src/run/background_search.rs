@@ -25,7 +25,6 @@ use super::{GoalStatus, Run, Stop, Verdict};
 use crate::belief_state::BeliefState;
 use crate::event::ActionHandle;
 use crate::executor::PlanForm;
-use crate::executor::SUPPORTS_REAL_CLOCK;
 use crate::executor::StepId;
 use crate::planning::{PlanAnswer, Planned};
 use crate::reason::{Cause, Reason, Subject};
@@ -171,7 +170,7 @@ impl Run<'_> {
     pub(super) fn plans_aside(&self) -> bool {
         let has_begun = self.now.is_positive() || self.action_log.started() > 0;
         let is_waited_for = !has_begun && !self.becomes_idle_after(&Verdict::GoalReached);
-        SUPPORTS_REAL_CLOCK && self.settings.plans_aside && !is_waited_for
+        self.settings.plans_aside && !is_waited_for
     }
 
     /// Records that the planner has finished.
@@ -348,7 +347,7 @@ impl Run<'_> {
 
     /// Returns the time of the next decision about the search if no event comes before.
     pub(super) fn next_search_decision(&self) -> Option<Rational> {
-        let search = self.search.as_ref().filter(|_| SUPPORTS_REAL_CLOCK)?;
+        let search = self.search.as_ref()?;
         let next = self.next_search_decision_of(search);
         if self.has_abandoned_goals() == Some(true) && !self.is_paused() {
             return Some(next.min(self.search_time_limit(search)));
@@ -408,7 +407,7 @@ impl Run<'_> {
         if self.is_goal_change_pending() {
             self.cancel_optional_search();
         }
-        let Some(search) = self.search.as_ref().filter(|_| SUPPORTS_REAL_CLOCK) else {
+        let Some(search) = self.search.as_ref() else {
             return Ok(false);
         };
         if self.is_goal_abandoned() {

@@ -10,7 +10,6 @@ use super::pending::PreparationFallback;
 use super::snapshot::Goals;
 use super::{MissingPlan, Run, Stop, Verdict};
 use crate::event::ActionHandle;
-use crate::executor::SUPPORTS_REAL_CLOCK;
 use crate::executor::{PlanEvent, PreparedPlan, StepId};
 use crate::preparation::PrepareError;
 use crate::record::Entry;
@@ -78,7 +77,7 @@ impl Run<'_> {
         let mut steps = mission.running.clone();
         steps.extend(&mission.begun);
         self.action_log.begin_plan(&steps);
-        if SUPPORTS_REAL_CLOCK && (self.settings.plans_aside || self.settings.monitors_slack) {
+        if self.settings.plans_aside || self.settings.monitors_slack {
             self.action_log.note_steps(mission);
         }
         self.steps = mission.time_triggered.steps.len();

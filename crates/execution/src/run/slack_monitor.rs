@@ -4,7 +4,7 @@ use elbowroom_num::Rational;
 
 use super::Run;
 use crate::event::ActionHandle;
-use crate::executor::{SUPPORTS_REAL_CLOCK, StepId};
+use crate::executor::StepId;
 use crate::record::{Entry, WarningCause};
 
 /// A running action that may become late, with its latest tolerable end.
@@ -27,7 +27,7 @@ impl Run<'_> {
     /// the time between the planned end and the latest tolerable end is left, or twice the expected
     /// planning time if that is longer. Returns the time of the next check.
     pub(super) fn warn_of_late_actions(&mut self) -> Option<Rational> {
-        if !SUPPORTS_REAL_CLOCK || !self.settings.monitors_slack {
+        if !self.settings.monitors_slack {
             return None;
         }
         let (due, later): (Vec<LateAction>, Vec<LateAction>) =

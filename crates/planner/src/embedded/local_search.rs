@@ -31,7 +31,7 @@ use super::search::is_goal;
 use super::state::State;
 use super::step_costs::StepCosts;
 use super::time::{NEVER, Ticks};
-use super::tuning::{IS_WHOLE, Technique};
+use super::tuning::Technique;
 use incumbent::{Incumbent, PlanCost};
 use random::Random;
 use repair::Repair;
@@ -226,7 +226,7 @@ impl<'a> Refiner<'a> {
     pub(crate) fn try_change(&mut self, ticker: &mut WorkMeter<'_>) -> Option<Vec<Step>> {
         let (best, items) = self.best.as_ref()?;
         let done_before = ticker.work;
-        if IS_WHOLE && self.is_turn_to_schedule() {
+        if self.is_turn_to_schedule() {
             // This search does not use the random numbers and counters of the other methods, so
             // that these find the same plans where it finds nothing.
             let bound = best.clone();
@@ -380,7 +380,7 @@ impl<'a> Refiner<'a> {
         };
         let compiled = self.compiled;
         let of_these = |scheduling: &Scheduling<'_>| scheduling.is_of(&incumbent.items);
-        if IS_WHOLE && self.scheduling.as_ref().is_some_and(of_these) {
+        if self.scheduling.as_ref().is_some_and(of_these) {
             self.incumbent = Some(incumbent);
             return;
         }

@@ -410,10 +410,6 @@ constants! {
     most_symmetry_comparisons: usize = 300_000;
 }
 
-/// `true` if all techniques are included. A module for browsers must be small, and omits scheduling
-/// and reasonable orders.
-pub(crate) const IS_WHOLE: bool = !cfg!(target_family = "wasm");
-
 impl Tuning {
     /// Returns `true` if the technique is in use.
     pub fn uses(&self, technique: Technique) -> bool {

@@ -33,11 +33,7 @@ pub struct Best {
     /// Proof that the box is inside the envelope and that no box exceeds `bound`, in the form that
     /// [`elbowroom_verify`] checks. `None` if the search was interrupted, or if some end is
     /// undecided.
-    ///
-    /// The WebAssembly build serializes it but does not deserialize it: pages only draw answers,
-    /// and the code that reads certificates would be a thirtieth of the module.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(target_family = "wasm", serde(skip_deserializing))]
     pub certificate: Option<Certificate>,
     /// Probability that all durations stay inside, if that is the objective.
     #[serde(default, skip_serializing_if = "Option::is_none")]

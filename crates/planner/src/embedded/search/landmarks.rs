@@ -4,7 +4,6 @@ use super::super::landmarks::Landmarks;
 use super::super::mutex::Mutexes;
 use super::super::relaxed::Labels;
 use super::super::state::State;
-use super::super::tuning::IS_WHOLE;
 use super::novelty::goals_left;
 use super::{Expansion, Search};
 
@@ -43,7 +42,7 @@ impl Search<'_> {
                     let is_only = self.compiled.tuning.only.is_some();
                     let found = found.filter(|found| found.intermediate_count > 0 || is_only);
                     found.map(|mut landmarks| {
-                        if IS_WHOLE && self.compiled.tuning.reasonable_orders > 0 {
+                        if self.compiled.tuning.reasonable_orders > 0 {
                             let most = self.compiled.tuning.most_mutex_work;
                             let mutexes = Mutexes::of(self.compiled, initial, most);
                             landmarks.order_reasonably(graph, &labels, &mutexes);

@@ -1,7 +1,7 @@
 //! Schedule of the search for better orders.
 
 use super::super::super::compile::Metric;
-use super::super::super::tuning::{IS_WHOLE, Technique};
+use super::super::super::tuning::Technique;
 use super::super::incumbent::Incumbent;
 use super::super::sequence::Item;
 use super::super::{Refiner, WorkMeter};
@@ -10,7 +10,7 @@ use super::Scheduling;
 impl Refiner<'_> {
     /// Reacts to a new best plan: continues from it if it has the same actions.
     pub(in super::super) fn schedule_from_best(&mut self) {
-        let Some((worth, items)) = self.best.as_ref().filter(|_| IS_WHOLE) else {
+        let Some((worth, items)) = self.best.as_ref() else {
             return;
         };
         // If only the order differs, the search continues.

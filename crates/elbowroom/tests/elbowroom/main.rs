@@ -1,0 +1,45 @@
+//! Integration tests of the library as a whole: envelopes, certificates, networks, and plan execution.
+
+mod answers;
+mod authors_boxes;
+mod cases;
+mod ccmmz;
+mod certificates;
+mod chosen_plans;
+mod course_kept;
+mod deorder_sound;
+mod derived_certificates;
+mod execution;
+mod executors_page;
+mod export;
+#[allow(dead_code, unused_imports, reason = "shared with other programs")]
+#[path = "../../../../testing/game.rs"]
+mod game;
+mod golden_runs;
+mod improving_plans;
+mod kinds;
+mod kinds_of_plans;
+mod learning;
+mod likely_boxes;
+mod many_parameters;
+mod networks;
+mod no_plan;
+mod no_plan_claims;
+mod nominal_plans;
+mod odds;
+mod one_envelope;
+mod processes_and_events;
+mod promise;
+mod published_regions;
+mod rcll;
+mod region;
+mod repairs;
+mod requests;
+mod rounded_plans;
+mod sampling;
+mod shared;
+#[allow(dead_code, unused_imports, reason = "shared with other programs")]
+#[path = "../../../../testing/solvable/mod.rs"]
+mod solvable;
+mod stn_files;
+mod wall_clock_times;

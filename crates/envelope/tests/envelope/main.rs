@@ -1,0 +1,12 @@
+//! Integration tests of envelopes: found boxes, and oracles that decide the same questions in other ways.
+
+mod best;
+mod best_probability;
+mod deordered_plans;
+mod found_bugs;
+mod given;
+mod irr;
+mod oracle;
+mod second_oracle;
+#[path = "../../../../testing/skipped.rs"]
+mod skipped;

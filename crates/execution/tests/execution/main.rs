@@ -1,0 +1,3 @@
+//! Integration tests of plan execution that need only this crate.
+
+mod contract;

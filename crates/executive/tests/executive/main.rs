@@ -1,0 +1,3 @@
+//! Integration tests of persistent runs, as a library.
+
+mod in_process;

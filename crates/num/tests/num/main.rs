@@ -1,0 +1,4 @@
+//! Integration tests of numbers: chances and normal distributions.
+
+mod chance;
+mod normal;
