@@ -1,4 +1,4 @@
-//! Integration tests of the bridge to PlanSys2.
+//! Integration tests of the bridge to `PlanSys2`.
 
 mod adversary;
 #[path = "../../../../testing/skipped.rs"]
