@@ -1,7 +1,8 @@
 //! The command `elbowroom`: robustness envelopes, execution and validation of temporal plans.
 //!
-//! The output streams and exit codes are a stable interface, see `docs/exit-codes.md`. This crate
-//! does all input and output of the workspace; the library does the computations.
+//! The output streams and exit codes are a stable interface, see `docs/exit-codes.md`. This crate is
+//! the only one that prints. The library does the computations, and `elbowroom-executive` executes
+//! plans.
 
 mod args;
 mod calendar;

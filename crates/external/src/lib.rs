@@ -18,11 +18,10 @@
 //! 5. `run`, `judge`: each plan is validated before it is reported, and repaired if only its times
 //!    are rounded.
 //!
-//! This is the only crate below the command line that reads a clock, starts threads and processes
-//! and writes files, and is therefore separate. Processes are supervised on Unix systems. On
-//! others, including WebAssembly, the outcome is [`Outcome::NotStarted`] before any of these is
-//! used. Memory limits, and the search for children that left the process group, need Linux's
-//! `/proc`.
+//! This is the only crate below `elbowroom-executive` that reads a clock, starts processes and writes
+//! files, and is therefore separate. Processes are supervised on Unix systems. On others, including
+//! WebAssembly, the outcome is [`Outcome::NotStarted`] before any of these is used. Memory limits, and
+//! the search for children that left the process group, need Linux's `/proc`.
 //!
 //! ```
 //! use elbowroom_external::{Planner, REGISTRY};

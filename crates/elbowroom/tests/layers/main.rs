@@ -3,8 +3,8 @@
 //! A program of its own, with the other tests that only read files: it is compiled in seconds, and `cargo build
 //! --workspace --bin elbowroom --test layers` builds the command with the features of dependencies that tests use.
 //!
-//! Cargo forbids cyclic dependencies, but does not check layers; this table does. It is the table
-//! of ARCHITECTURE.md. Change both together, and give the reason there.
+//! Cargo forbids cyclic dependencies, but does not check layers; this table does. The code map of
+//! ARCHITECTURE.md has the same list. Change both together, and give the reason there.
 //!
 //! `[dependencies]`, `[build-dependencies]` and their `[target.….…]` forms count, also under
 //! another name. `[dev-dependencies]` do not count: a test may depend on a higher layer, because
@@ -201,7 +201,7 @@ fn only_the_laboratory_has_a_pool_of_threads() {
 /// Crates that communicate with the world. They use threads only to wait for others.
 const ADAPTER_CRATES: [&str; 5] = ["cli", "executive", "external", "plansys2", "python"];
 
-/// The third rule of ARCHITECTURE.md. Tests may create threads.
+/// The third convention of ARCHITECTURE.md. Tests may create threads.
 #[test]
 fn threads_are_spawned_in_one_file() {
     let mut found = Vec::new();
