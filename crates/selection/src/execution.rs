@@ -144,7 +144,7 @@ enum ExecutorChoice<'a> {
 
 /// The rollouts of a run, a port: they evaluate its decisions, and may already know the best plan
 /// for a situation.
-pub trait RunRollouts {
+pub trait RunRollouts: Send {
     /// Returns an evaluator of decisions.
     fn evaluator(&self) -> Box<dyn RolloutEvaluator>;
 
