@@ -53,8 +53,13 @@ impl GoalSelection {
         self.names.iter().position(|it| it == name)
     }
 
-    /// Records that no plan reaches all goals of a conflict.
-    fn note_conflicts(&mut self, conflicts: &[Conflict]) {
+    /// Records that no plan reaches all goals of a conflict, or a goal that is proven to be late.
+    fn note_proofs(&mut self, conflicts: &[Conflict], goals: &[OpenGoal]) {
+        for goal in goals.iter().filter(|goal| goal.is_proven_late) {
+            if let Some(position) = self.position(&goal.name) {
+                self.selection.exclude(GoalSet::from([position]));
+            }
+        }
         for conflict in conflicts {
             let members = conflict.goals.iter().map(|name| self.position(name));
             if let Some(set) = members.collect::<Option<GoalSet>>() {
@@ -337,7 +342,7 @@ impl Run<'_> {
         };
         if let Some(mut choosing) = lasting.selection.take() {
             self.record_unreachable_goals();
-            choosing.note_conflicts(&self.conflicts());
+            self.note_proofs(&mut choosing);
             let step = choosing.selection.after_failure(choosing.tried.clone());
             return self.pursue_selection_step(choosing, step, true);
         }
@@ -347,7 +352,7 @@ impl Run<'_> {
         let tried = lasting.goals.iter().filter(|goal| goal.is_pursued());
         let tried: BTreeSet<String> = tried.map(|goal| goal.name.clone()).collect();
         let mut choosing = GoalSelection::among_goals(self.set_unreachable_goals_aside());
-        choosing.note_conflicts(&self.conflicts());
+        self.note_proofs(&mut choosing);
         let positions = tried.iter().map(|name| choosing.position(name));
         let step = match positions.collect::<Option<GoalSet>>() {
             Some(tried) => choosing.selection.after_failure(tried),
@@ -355,6 +360,12 @@ impl Run<'_> {
             None => SelectionStep::Try(choosing.tried.clone()),
         };
         self.pursue_selection_step(choosing, step, true)
+    }
+
+    /// Excludes from a selection the sets of goals that are proven to have no plan.
+    fn note_proofs(&self, choosing: &mut GoalSelection) {
+        let goals = self.goal_manager.as_ref().map(|it| &it.goals[..]);
+        choosing.note_proofs(&self.conflicts(), goals.unwrap_or_default());
     }
 
     /// Sets aside the open goals that can never become true. Returns the names and values of the
@@ -427,6 +438,7 @@ impl Run<'_> {
             return false;
         };
         self.record_unreachable_goals();
+        self.note_proofs(&mut choosing);
         let step = choosing.selection.after_failure(choosing.tried.clone());
         self.pursue_selection_step(choosing, step, false)
     }
