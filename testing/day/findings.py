@@ -1,6 +1,7 @@
 """Checks of a shift: what the executive claims, compared with what really happened."""
 
 import json
+import subprocess
 
 import depot
 
@@ -124,11 +125,26 @@ def check_goals(shift, truth):
     findings.value, findings.possible = value, possible
 
 
+def check_records(shift):
+    """Each segment of the journal can be replayed, and the executive has reported no panic."""
+    segments = shift.executive.segments()
+    for segment in segments:
+        line = [shift.executive.program, "run", "--replay", segment]
+        done = subprocess.run([str(it) for it in line], capture_output=True, text=True)
+        if done.returncode != 0:
+            said = (done.stdout + done.stderr)[-300:]
+            shift.findings.broken(f"the replay of {segment.name} ends with exit code {done.returncode}: {said}")
+    shift.findings.figures["segments of the journal"] = len(segments)
+    if "panicked" in (shift.folder / "stderr.txt").read_text():
+        shift.findings.broken("the executive has panicked")
+
+
 def examine(shift):
     """All checks of a shift that has ended."""
     truth = read_truth(shift)
     check_starts(shift, truth)
     check_goals(shift, truth)
+    check_records(shift)
     findings = shift.findings
     times = sorted(shift.executive.latencies) or [0.0]
     findings.figures["requests, ms, median / 99 % / worst"] = " / ".join(

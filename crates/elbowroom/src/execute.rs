@@ -38,8 +38,8 @@ pub(crate) use plan_selection::renumbered;
 pub use plan_selection::{
     Choice, FirstPlan, PlanSelector, SelectingPlanner, UnknownFirstPlan, Value, WorldKnowledge,
 };
+pub(crate) use planners::{CERTIFICATE_WORK, WITHOUT_SELF_OVERLAP, certificate_work, exhausted};
 pub use planners::{Embedded, FnPlanner, PLANNING_BUDGET, planning_work};
-pub(crate) use planners::{WITHOUT_SELF_OVERLAP, exhausted};
 pub use probability_comparator::{MostProbablePlanner, SharedMostProbablePlanner};
 pub(crate) use propositional::with_fixed_durations;
 pub(crate) use race::is_behind;
