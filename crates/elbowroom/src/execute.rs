@@ -15,7 +15,6 @@ pub use elbowroom_selection::{
     WorldKnowledge, check_vary, execute, ill_typed_part, obstacle_to_deadline, planning_work,
     read_goal, rewrite,
 };
-
 pub use spec::{
     AdversaryError, AdversarySettings, EMBEDDED, FirstPlanError, MOST_STATES, NO_PLANNER,
     NamedText, RunSpec, SpecError,

@@ -83,6 +83,7 @@ mod better_plan;
 mod clock_watchdog;
 mod dead_end;
 mod doubts;
+mod goal_closing;
 mod goal_selection;
 mod goals;
 mod history_pruning;

@@ -55,7 +55,8 @@ pub use plan_selection::{
     Choice, FirstPlan, PlanSelector, SelectingPlanner, UnknownFirstPlan, Value, WorldKnowledge,
 };
 pub use planners::{
-    Embedded, FnPlanner, PLANNING_BUDGET, WITHOUT_SELF_OVERLAP, exhausted, planning_work,
+    CERTIFICATE_WORK, Embedded, FnPlanner, PLANNING_BUDGET, WITHOUT_SELF_OVERLAP, certificate_work,
+    exhausted, planning_work,
 };
 pub use probability_comparator::{MostProbablePlanner, SharedMostProbablePlanner};
 pub use propositional::with_fixed_durations;

@@ -189,7 +189,14 @@ pub fn exhausted(counts: Counts, without_self_overlap: bool) -> String {
 pub const WITHOUT_SELF_OVERLAP: &str = "no plan without self-overlap (`--self-overlap`)";
 
 /// Work limit for a certificate in a run: about a second.
-pub(crate) const CERTIFICATE_WORK: u64 = 10_000_000;
+pub const CERTIFICATE_WORK: u64 = 10_000_000;
+
+/// Returns the work limit for a certificate with this planning budget, in seconds: about as long, and at most
+/// [`CERTIFICATE_WORK`].
+pub fn certificate_work(budget: &Rational) -> u64 {
+    // A unit of certificates takes about a hundred nanoseconds.
+    (planning_work(budget) / 100).min(CERTIFICATE_WORK)
+}
 
 /// Returns the answer to the embedded planner's claim that no plan exists from a situation. No plan exists if
 /// a certificate proves it for all ends of the running actions; otherwise, none was found.

@@ -53,8 +53,18 @@ impl GoalSelection {
         self.names.iter().position(|it| it == name)
     }
 
-    /// Records that no plan reaches all goals of a conflict.
-    fn note_conflicts(&mut self, conflicts: &[Conflict]) {
+    /// Leaves a goal out of all further attempts.
+    pub(super) fn exclude(&mut self, name: &str) {
+        if let Some(position) = self.position(name) {
+            self.selection.exclude(GoalSet::from([position]));
+        }
+    }
+
+    /// Records that no plan reaches all goals of a conflict, or a goal that is proven to be late.
+    fn note_proofs(&mut self, conflicts: &[Conflict], goals: &[OpenGoal]) {
+        for goal in goals.iter().filter(|goal| goal.is_proven_late) {
+            self.exclude(&goal.name);
+        }
         for conflict in conflicts {
             let members = conflict.goals.iter().map(|name| self.position(name));
             if let Some(set) = members.collect::<Option<GoalSet>>() {
@@ -76,125 +86,6 @@ impl Run<'_> {
     pub(super) fn is_selecting_goals(&self) -> bool {
         let lasting = self.goal_manager.as_ref();
         lasting.is_some_and(|lasting| lasting.selection.is_some())
-    }
-
-    /// Closes the goals that are achieved while others are still pursued.
-    pub(super) fn close_achieved_goals(&mut self) {
-        let Some(lasting) = self.goal_manager.as_mut().filter(|it| it.goals.len() > 1) else {
-            return;
-        };
-        let belief = &self.belief;
-        // Goals to keep have to hold together in the end.
-        let is_achieved =
-            |goal: &OpenGoal| !goal.terms.keep && belief.is_certain(&goal.ground) == Ok(true);
-        let is_left = |goal: &OpenGoal| goal.is_pursued() && !is_achieved(goal);
-        if !lasting.goals.iter().any(is_left) || !lasting.goals.iter().any(is_achieved) {
-            return;
-        }
-        let (achieved, left): (Vec<_>, Vec<_>) = lasting.goals.drain(..).partition(is_achieved);
-        lasting.goals = left;
-        self.continue_without(&achieved);
-    }
-
-    /// Continues with the other goals after these were achieved.
-    fn continue_without(&mut self, achieved: &[OpenGoal]) {
-        self.search_results.has_closed_goals = self.search.is_some();
-        self.record_achieved(achieved);
-        self.set_goal();
-        if self.search.is_none() && self.is_selecting_goals() {
-            // Without the closed goals, more sets may have a plan.
-            self.restart_selection(false);
-        }
-    }
-
-    /// Returns the next coming deadline of an open goal.
-    pub(super) fn next_deadline_of_a_goal(&self) -> Option<Rational> {
-        let goals = self.goal_manager.iter().flat_map(|it| &it.goals);
-        let deadlines = goals.filter_map(|goal| goal.terms.deadline.as_ref());
-        deadlines.filter(|it| **it > self.now).min().cloned()
-    }
-
-    /// Closes the goals whose deadlines are before this time, in their order. All events up to the
-    /// deadlines must be known.
-    pub(super) fn close_goals_due_before(&mut self, time: &Rational) {
-        let goals = self.goal_manager.iter().flat_map(|it| &it.goals);
-        let deadlines = goals.filter_map(|goal| goal.terms.deadline.clone());
-        let due: BTreeSet<Rational> = deadlines.filter(|it| it < time).collect();
-        for deadline in due {
-            let _ = self.belief.advance(&deadline);
-            self.close_goals_due(&deadline);
-        }
-    }
-
-    /// Closes achieved goals with deadlines, because they need not stay true, and goals whose
-    /// deadlines are now.
-    pub(super) fn close_momentary_goals(&mut self) {
-        let Some(lasting) = &mut self.goal_manager else {
-            return;
-        };
-        let belief = &self.belief;
-        let is_achieved = |goal: &mut OpenGoal| {
-            goal.terms.deadline.is_some() && belief.is_certain(&goal.ground) == Ok(true)
-        };
-        let achieved: Vec<OpenGoal> = lasting.goals.extract_if(.., is_achieved).collect();
-        let is_any_left = lasting.goals.iter().any(OpenGoal::is_pursued);
-        match names_of(&achieved) {
-            Some(_) if is_any_left => self.continue_without(&achieved),
-            Some(names) => {
-                self.record_achieved(&achieved);
-                self.pursue_all();
-                self.record_goal_change(format!("{names} is reached"), false);
-            }
-            None => {}
-        }
-        self.close_goals_due(&self.now.clone());
-    }
-
-    /// Closes the goals with deadlines up to this time. The others are pursued without them.
-    fn close_goals_due(&mut self, time: &Rational) {
-        let Some(lasting) = &mut self.goal_manager else {
-            return;
-        };
-        let is_due =
-            |goal: &mut OpenGoal| goal.terms.deadline.as_ref().is_some_and(|it| it <= time);
-        let due: Vec<OpenGoal> = lasting.goals.extract_if(.., is_due).collect();
-        // A goal may have been achieved exactly at its deadline.
-        let is_achieved = |goal: &OpenGoal| self.belief.is_certain(&goal.ground) == Ok(true);
-        let (achieved, late): (Vec<_>, Vec<_>) = due.into_iter().partition(is_achieved);
-        self.record_achieved(&achieved);
-        for goal in &late {
-            let why = match &goal.set_aside {
-                Some(aside) => format!("its deadline has passed; it was set aside: {aside}"),
-                None => match &goal.missed_deadline {
-                    Some(late) => {
-                        format!("its deadline has passed; it would have been reached {late}")
-                    }
-                    None => "its deadline has passed".to_owned(),
-                },
-            };
-            self.ports.recorder.record(&Entry::Goal {
-                now: &self.now,
-                name: &goal.name,
-                change: GoalChange::Failed { why: &why },
-            });
-        }
-        let words = match (names_of(&late), names_of(&achieved)) {
-            (Some(late), _) => format!("too late for {late}"),
-            (None, Some(achieved)) => format!("{achieved} is reached"),
-            (None, None) => return,
-        };
-        self.pursue_all();
-        self.record_goal_change(words, false);
-    }
-
-    fn record_achieved(&mut self, goals: &[OpenGoal]) {
-        for goal in goals {
-            self.ports.recorder.record(&Entry::Goal {
-                now: &self.now,
-                name: &goal.name,
-                change: GoalChange::Achieved,
-            });
-        }
     }
 
     /// Pursues all open goals again, from the next plan on.
@@ -311,7 +202,7 @@ impl Run<'_> {
     /// Begins a selection among all open goals that can become true. `is_tried` is `true` if no
     /// plan was found for all of them; if there are many goals, all of them are not tried together.
     /// Returns `false` if no goal can become true.
-    fn restart_selection(&mut self, is_tried: bool) -> bool {
+    pub(super) fn restart_selection(&mut self, is_tried: bool) -> bool {
         let mut choosing = GoalSelection::among_goals(self.set_unreachable_goals_aside());
         let all = choosing.tried.clone();
         let is_tried = is_tried || matches!(choosing.selection, Selection::Growth(_));
@@ -337,7 +228,7 @@ impl Run<'_> {
         };
         if let Some(mut choosing) = lasting.selection.take() {
             self.record_unreachable_goals();
-            choosing.note_conflicts(&self.conflicts());
+            self.note_proofs(&mut choosing);
             let step = choosing.selection.after_failure(choosing.tried.clone());
             return self.pursue_selection_step(choosing, step, true);
         }
@@ -347,7 +238,7 @@ impl Run<'_> {
         let tried = lasting.goals.iter().filter(|goal| goal.is_pursued());
         let tried: BTreeSet<String> = tried.map(|goal| goal.name.clone()).collect();
         let mut choosing = GoalSelection::among_goals(self.set_unreachable_goals_aside());
-        choosing.note_conflicts(&self.conflicts());
+        self.note_proofs(&mut choosing);
         let positions = tried.iter().map(|name| choosing.position(name));
         let step = match positions.collect::<Option<GoalSet>>() {
             Some(tried) => choosing.selection.after_failure(tried),
@@ -355,6 +246,12 @@ impl Run<'_> {
             None => SelectionStep::Try(choosing.tried.clone()),
         };
         self.pursue_selection_step(choosing, step, true)
+    }
+
+    /// Excludes from a selection the sets of goals that are proven to have no plan.
+    fn note_proofs(&self, choosing: &mut GoalSelection) {
+        let goals = self.goal_manager.as_ref().map(|it| &it.goals[..]);
+        choosing.note_proofs(&self.conflicts(), goals.unwrap_or_default());
     }
 
     /// Sets aside the open goals that can never become true. Returns the names and values of the
@@ -427,6 +324,7 @@ impl Run<'_> {
             return false;
         };
         self.record_unreachable_goals();
+        self.note_proofs(&mut choosing);
         let step = choosing.selection.after_failure(choosing.tried.clone());
         self.pursue_selection_step(choosing, step, false)
     }

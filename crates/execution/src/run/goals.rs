@@ -28,6 +28,8 @@ pub(super) struct OpenGoal {
     pub(super) set_aside: Option<String>,
     /// Lateness in words, if its deadline is known to be missed.
     pub(super) missed_deadline: Option<String>,
+    /// `true` if a certificate proves that it misses its deadline, whichever other goals are pursued.
+    pub(super) is_proven_late: bool,
     /// `true` if the record contains that it is set aside.
     pub(super) is_announced: bool,
     /// The reason for which it is queued, if it is.
@@ -51,6 +53,7 @@ impl OpenGoal {
             unreachable: None,
             set_aside: None,
             missed_deadline: None,
+            is_proven_late: false,
             is_announced: false,
             wait: Wait::default(),
         }

@@ -95,7 +95,7 @@ pub(super) struct GoalManager<'a> {
     /// The names of the plan's goals.
     pub(super) planned_goals: BTreeSet<String>,
     /// Start of the idle state.
-    idle_since: Option<Rational>,
+    pub(super) idle_since: Option<Rational>,
     /// `true` if it is proved that no plan reaches the goals from there, including the effects of
     /// all coming timed initials.
     is_unsolvable: bool,

@@ -5,6 +5,7 @@
 //! to [`MOST_EXACT`] goals, the sets are tried in order of their value, which is the sum of the
 //! values of their goals; sets of equal value are tried in order of size and preference. So the
 //! first set with a plan has the greatest value. A superset of a set without a plan is not tried.
+//! A goal that is proven to have no plan is not tried again.
 //! With more goals, the selection grows: first by one goal, after each success by twice as many as
 //! before, and after each failure by half as many. In the end it is maximal, and each plan on the
 //! way is executed at once.
@@ -40,6 +41,10 @@ pub(super) struct GrowingSelection {
     rest: Vec<usize>,
     /// The goals being tried together with the selected ones.
     tried: Vec<usize>,
+    /// The goals that are proven to have no plan.
+    excluded: GoalSet,
+    /// `true` if goals were excluded from the tried ones since the last step.
+    is_reduced: bool,
 }
 
 /// The next step of a selection.
@@ -71,8 +76,16 @@ impl Selection {
 
     /// Records that there is no plan for this set, which may not have been tried.
     pub(super) fn exclude(&mut self, set: GoalSet) {
-        if let Self::Exact { failed, .. } = self {
-            failed.push(set);
+        match self {
+            Self::Exact { failed, .. } => failed.push(set),
+            Self::Growth(growth) if set.len() == 1 => {
+                growth.rest.retain(|goal| !set.contains(goal));
+                let tried = growth.tried.len();
+                growth.tried.retain(|goal| !set.contains(goal));
+                growth.is_reduced |= growth.tried.len() < tried;
+                growth.excluded.extend(set);
+            }
+            Self::Growth(_) => {}
         }
     }
 
@@ -80,7 +93,7 @@ impl Selection {
     pub(super) fn is_excluded(&self, goal: usize) -> bool {
         match self {
             Self::Exact { failed, .. } => failed.contains(&GoalSet::from([goal])),
-            Self::Growth(_) => false,
+            Self::Growth(growth) => growth.excluded.contains(&goal),
         }
     }
 
@@ -103,7 +116,9 @@ impl Selection {
             }
             Self::Growth(growth) => {
                 let again = growth.tried.len().div_ceil(2);
-                if growth.tried.len() > 1 {
+                if std::mem::take(&mut growth.is_reduced) && !growth.tried.is_empty() {
+                    // The rest of the tried goals may have a plan.
+                } else if growth.tried.len() > 1 {
                     growth.rest.extend(growth.tried.drain(again..).rev());
                 } else {
                     growth.tried.clear();
@@ -131,11 +146,12 @@ impl Selection {
 impl GrowingSelection {
     fn new(selected: GoalSet, count: usize) -> Self {
         let rest: Vec<usize> = (selected.len()..count).rev().collect();
-        let tried = Vec::new();
         Self {
             selected,
             rest,
-            tried,
+            tried: Vec::new(),
+            excluded: GoalSet::new(),
+            is_reduced: false,
         }
     }
 
@@ -262,6 +278,30 @@ mod tests {
         let (selected, questions) = select(&equal(200), |set| !set.contains(&77));
         assert_eq!(selected.len(), 199);
         assert!(questions < 30, "{questions}");
+    }
+
+    #[test]
+    fn goals_without_plan_by_proof_are_not_tried_again() {
+        for count in [3, 4, 5, 8, 40] {
+            // No plan reaches goal 1, which is proven by the first attempt with it.
+            let mut selection = Selection::among(equal(count));
+            let mut step = selection.after_failure((0..count).collect());
+            let mut failures = 0;
+            let selected = loop {
+                step = match step {
+                    SelectionStep::Select(set) => break set,
+                    SelectionStep::Try(set) if set.contains(&1) => {
+                        failures += 1;
+                        selection.exclude([1].into());
+                        selection.after_failure(set)
+                    }
+                    SelectionStep::Try(set) => selection.after_success(set),
+                };
+            };
+            assert_eq!(selected, (0..count).filter(|it| *it != 1).collect());
+            assert!(selection.is_excluded(1), "{count}");
+            assert_eq!(failures, 1, "{count}");
+        }
     }
 
     #[test]

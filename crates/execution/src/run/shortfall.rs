@@ -45,6 +45,9 @@ impl Run<'_> {
         };
         if !is_choosing {
             lasting.conflicts.clear();
+            for goal in &mut lasting.goals {
+                goal.is_proven_late = false;
+            }
         }
         if !shortfall.conflict.is_empty() {
             lasting.conflicts.push(shortfall.conflict.clone());
@@ -65,6 +68,7 @@ impl Run<'_> {
             let Some((goal, deadline)) = goal.zip(given.terms.deadline.as_ref()) else {
                 continue;
             };
+            goal.is_proven_late |= late.proven_lower_bound.is_some();
             let mut late = late.clone();
             // A plan for several goals may reach this one later than necessary.
             late.achieved_at = late.achieved_at.filter(|_| is_alone);

@@ -1,6 +1,5 @@
 //! Analysis of success probabilities, and the lattice of orders, compared with the enumeration of
 //! all worlds and all orders.
-#![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
 
 use crate::shared;
 use crate::twin;

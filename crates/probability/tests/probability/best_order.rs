@@ -1,5 +1,4 @@
 //! `PGen`, compared with the enumeration of all orders.
-#![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
 
 use crate::shared;
 use crate::twin;

@@ -1,5 +1,4 @@
 //! `PExec`: choice of the next happening.
-#![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
 
 use crate::shared;
 use std::sync::Arc;

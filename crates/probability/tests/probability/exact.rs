@@ -1,5 +1,4 @@
 //! The pruned network, compared with the enumeration of all worlds.
-#![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
 
 use crate::twin::Worlds;
 use crate::twin::random::{Case, Taste, case, failing_in_time, in_time, order, with_failing_ends};

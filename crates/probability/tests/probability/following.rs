@@ -1,5 +1,4 @@
 //! Cached data of an order leads to the same decisions as a computation from scratch.
-#![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
 
 use crate::shared;
 use std::fmt::Write;

@@ -1,5 +1,4 @@
 //! Likelihood files: their meaning, and messages about mistakes.
-#![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
 
 use crate::shared;
 use elbowroom_model::Task;

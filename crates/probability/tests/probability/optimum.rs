@@ -1,5 +1,4 @@
 //! Optimal values, compared with closed forms, a plain recursion, and the authors' worlds.
-#![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
 
 use crate::shared;
 use std::sync::Arc;

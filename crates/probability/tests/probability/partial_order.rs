@@ -1,5 +1,4 @@
 //! Orderings of a plan that are kept.
-#![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
 
 use crate::shared;
 use elbowroom_plan::partial_order::LinkKind;

@@ -2,7 +2,6 @@
 //!
 //! Runs if `python3`, or the program in `ELBOWROOM_PYTHON`, has pgmpy. Otherwise, reports that it
 //! is skipped.
-#![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
 
 use std::fmt::Write as _;
 use std::io::Write as _;

@@ -1,6 +1,5 @@
 //! The optimum of random worlds without time, compared with an independent value iteration: the
 //! worlds are described once as numbers, and once as PDDL and likelihoods.
-#![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
 
 use std::fmt::Write as _;
 

@@ -22,9 +22,9 @@ use elbowroom_text::Diagnostics;
 
 use super::{EMBEDDED, NO_PLANNER, RunSpec};
 use crate::execute::{
-    ActionSets, AdversarialWorld, Embedded, Execution, External, FirstPlan, MostProbablePlanner,
-    PlanPreparer, PlanSelector, Replanning, RolloutPolicy, Rollouts, SelectingPlanner,
-    SharedRolloutPolicy, WorldKnowledge, planning_work,
+    ActionSets, AdversarialWorld, CERTIFICATE_WORK, Embedded, Execution, External, FirstPlan,
+    MostProbablePlanner, PlanPreparer, PlanSelector, Replanning, RolloutPolicy, Rollouts,
+    SelectingPlanner, SharedRolloutPolicy, WorldKnowledge, certificate_work, planning_work,
 };
 use crate::{BoxTextError, DistributionError, parse_box, pipeline};
 
@@ -385,6 +385,10 @@ impl RunSpec {
             } else {
                 Embedded::default().first_plan_factor
             },
+            certificate_work: self
+                .planning_budget
+                .as_ref()
+                .map_or(CERTIFICATE_WORK, certificate_work),
             ..Embedded::default()
         }
     }

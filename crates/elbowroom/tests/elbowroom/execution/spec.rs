@@ -284,6 +284,23 @@ fn policy_reports_reason_for_missing_table() {
     assert!(reason(varied, "0.000001").is_some_and(|why| why.contains("--planning-budget")));
 }
 
+#[test]
+fn planning_budget_limits_work_for_certificates() {
+    let work = |budget: Option<&str>| {
+        let planning_budget = budget.map(|it| it.parse().expect("a correct test"));
+        RunSpec {
+            planning_budget,
+            ..spec()
+        }
+        .embedded()
+        .certificate_work
+    };
+    assert_eq!(work(Some("0.1")), 1_000_000);
+    assert_eq!(work(Some("0")), 0);
+    assert_eq!(work(Some("2")), work(None));
+    assert!(work(Some("0.5")) < work(None));
+}
+
 /// A failure of the first action makes the start of the second one impossible, without a report.
 #[test]
 fn policy_does_not_start_a_refused_action_without_end() {

@@ -265,6 +265,45 @@ fn late_goal_is_set_aside_and_fails_at_its_deadline() {
 }
 
 #[test]
+fn goal_that_is_proven_late_is_not_tried_again() {
+    let script = vec![
+        (0, pursue_by("late", "(at ward)", 5)),
+        (0, pursue_by("lab", "(at lab)", 15)),
+        (0, pursue_by("ward", "(at ward)", 25)),
+    ];
+    let told = run(&task_with_rooms("(and)"), 100, script);
+    let expected = [
+        "0: `late` set aside, because no plan reaches it by its deadline",
+        "10: `lab` achieved",
+        "20: `ward` achieved",
+    ];
+    assert_has(&told, &expected);
+    // One for all goals, and one for the others.
+    let searches = told.notes.iter().filter(|it| it.starts_with("0: plan"));
+    assert_eq!(searches.count(), 2, "{:#?}", told.notes);
+}
+
+#[test]
+fn deadline_of_a_goal_that_is_set_aside_does_not_disturb_the_plan() {
+    let script = vec![
+        (0, pursue_by("late", "(at ward)", 5)),
+        (0, pursue_by("lab", "(at lab)", 15)),
+    ];
+    let told = run(&task_with_rooms("(and)"), 100, script);
+    let expected = [
+        "0: `late` set aside",
+        "5: `late` failed",
+        "10: `lab` achieved",
+    ];
+    assert_has(&told, &expected);
+    assert!(
+        !has(&told, "5: plan") && !has(&told, "5: the plan is kept"),
+        "{:#?}",
+        told.notes
+    );
+}
+
+#[test]
 fn a_goal_without_others_fails_at_its_deadline() {
     let script = vec![
         (0, pursue_by("ward", "(at ward)", 5)),
