@@ -1,5 +1,4 @@
 //! Choice among many plans by their probability or their slack.
-#![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
 
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;

@@ -1,5 +1,4 @@
 //! Plans reported during the search.
-#![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
 
 use std::ops::ControlFlow;
 use std::path::Path;

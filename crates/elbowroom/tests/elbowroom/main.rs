@@ -1,4 +1,5 @@
 //! Integration tests of the library as a whole: envelopes, certificates, networks, and plan execution.
+#![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
 
 mod answers;
 mod authors_boxes;

@@ -1,5 +1,4 @@
 //! Success probability of a plan: the complete answer.
-#![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
 
 use std::path::Path;
 use std::sync::Arc;

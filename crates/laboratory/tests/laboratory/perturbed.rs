@@ -1,5 +1,4 @@
 //! Experiments of paper 2.
-#![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
 
 use std::fs;
 use std::path::Path;

@@ -17,14 +17,15 @@ use elbowroom_num::{Rational, work};
 use elbowroom_planner::embedded;
 use elbowroom_probability::Likelihoods;
 use elbowroom_selection::timeouts::unknown_action;
+use elbowroom_selection::{CERTIFICATE_WORK, certificate_work};
 use elbowroom_sim::{ControlledWorld, SimWorld, WorldModel};
 use elbowroom_text::Diagnostics;
 
 use super::{EMBEDDED, NO_PLANNER, RunSpec};
 use crate::execute::{
-    ActionSets, AdversarialWorld, CERTIFICATE_WORK, Embedded, Execution, External, FirstPlan,
-    MostProbablePlanner, PlanPreparer, PlanSelector, Replanning, RolloutPolicy, Rollouts,
-    SelectingPlanner, SharedRolloutPolicy, WorldKnowledge, certificate_work, planning_work,
+    ActionSets, AdversarialWorld, Embedded, Execution, External, FirstPlan, MostProbablePlanner,
+    PlanPreparer, PlanSelector, Replanning, RolloutPolicy, Rollouts, SelectingPlanner,
+    SharedRolloutPolicy, WorldKnowledge, planning_work,
 };
 use crate::{BoxTextError, DistributionError, parse_box, pipeline};
 
