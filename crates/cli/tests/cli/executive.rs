@@ -599,7 +599,7 @@ fn wrong_command_line_is_rejected_before_any_effect() {
     let said = String::from_utf8_lossy(&nobody.stderr).into_owned();
     assert_eq!(nobody.status.code(), Some(2), "{said}");
     assert!(
-        said.contains("cannot ask the executive at 127.0.0.1:1"),
+        said.contains("cannot reach the executive at 127.0.0.1:1"),
         "{said}"
     );
 }

@@ -55,7 +55,7 @@ fn only_ends_with_a_reason_are_at_their_limits() {
         let far = sharpened("1000000000000", guarantee);
         assert!(!far.contains("Each end is at its limit"), "{far}");
         assert!(
-            far.contains("Each end with a reason is at its limit."),
+            far.contains("Each bound with a reason is at its limit."),
             "{far}"
         );
         assert!(
