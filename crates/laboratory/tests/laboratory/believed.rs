@@ -115,7 +115,7 @@ fn logs(experiment: &Experiment, count: u64, first: u64) -> Vec<Log> {
 /// like a sixth. The test checks the mean.
 ///
 /// For the table of docs/learning.md: `ELBOWROOM_LEARNT=20 cargo test --workspace --test laboratory
-/// what_was -- --nocapture`.
+/// world_learnt -- --nocapture`.
 #[test]
 fn world_learnt_from_few_logs_is_as_good_as_the_true_one() {
     let times: Option<u64> = std::env::var("ELBOWROOM_LEARNT")
