@@ -576,7 +576,7 @@ fn accepted_requests_survive_kill_9() {
 fn wrong_command_line_is_rejected_before_any_effect() {
     let nowhere = PathBuf::from("/nowhere/at/all").display().to_string();
     let tests: [(&[&str], &str); 6] = [
-        (&[DOMAIN, PROBLEM, "--http", "99999"], "write a port"),
+        (&[DOMAIN, PROBLEM, "--http", "99999"], "expected an address"),
         (
             &[DOMAIN, PROBLEM, "--token", &nowhere],
             "cannot read the token",
@@ -585,7 +585,7 @@ fn wrong_command_line_is_rejected_before_any_effect() {
             &[DOMAIN, PROBLEM, "--socket", &nowhere, "--http", "0"],
             "cannot listen at /nowhere",
         ),
-        (&[DOMAIN, PROBLEM, "--world", "spoiler"], "no wall clock"),
+        (&[DOMAIN, PROBLEM, "--world", "spoiler"], "cannot run on a wall clock"),
         (&[DOMAIN, PROBLEM, "--executor", "nobody"], "nobody"),
         (&[DOMAIN, PROBLEM, "--replay", &nowhere], "--replay"),
     ];

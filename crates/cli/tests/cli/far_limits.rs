@@ -50,10 +50,10 @@ fn sharpened(deadline: &str, guarantee: &str) -> String {
 fn only_ends_with_a_reason_are_at_their_limits() {
     for guarantee in ["strong", "dynamic", "weak"] {
         let near = sharpened("3000000000.5", guarantee);
-        assert!(near.contains("upper end of dur_0"), "{near}");
-        assert!(near.contains("Each end is at its limit."), "{near}");
+        assert!(near.contains("upper bound of dur_0"), "{near}");
+        assert!(near.contains("Each bound is at its limit."), "{near}");
         let far = sharpened("1000000000000", guarantee);
-        assert!(!far.contains("Each end is at its limit"), "{far}");
+        assert!(!far.contains("Each bound is at its limit"), "{far}");
         assert!(
             far.contains("Each bound with a reason is at its limit."),
             "{far}"

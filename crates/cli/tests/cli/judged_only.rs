@@ -155,7 +155,7 @@ fn compare_rejects_unsupported_features_first() {
     let output = elbowroom(&["compare", &experiment]);
     let said = String::from_utf8(output.stderr).expect("text");
     assert!(
-        said.contains("executors do not support processes and events (PDDL+) yet"),
+        said.contains("processes and events (PDDL+), which executors do not support yet"),
         "{said}"
     );
     fs::remove_dir_all(&folder).expect("it is there");

@@ -37,7 +37,7 @@ fn ineffective_options_of_run_are_rejected() {
         ),
         (
             &["--planner-time", "5", "--planner", "none"],
-            "says nothing to",
+            "has no effect with",
         ),
         (
             &["--seed", "3", "--world-process", "cat"],
@@ -336,7 +336,7 @@ fn only_results_of_the_experiment_are_merged_and_missing_parts_are_named() {
     let more = "[[column]]\nname = \"more\"\nworld = \"world.toml\"\n[[column]]";
     let other = experiment(&folder, &[("[[column]]", more), ("Late drives", "Others")]);
     let said = refusal(&["compare", &other, "--merge", &first, &last]);
-    assert!(said.contains("is not of this experiment"), "{said}");
+    assert!(said.contains("belongs to another experiment"), "{said}");
 
     let text = fs::read_to_string(&first).expect("results");
     let impossible = text.replace("\"shards\": 3", "\"shards\": 0");
@@ -353,7 +353,7 @@ fn unwritable_folder_is_reported_before_the_trials() {
     let file = experiment(&folder, &[("trials = 6", "trials = 1000000000")]);
     let bad = folder.join("experiment.toml/results").display().to_string();
     let said = refusal(&["compare", &file, "-o", &bad]);
-    assert!(said.contains("cannot make the folder"), "{said}");
+    assert!(said.contains("cannot create the folder"), "{said}");
     // The results are printed although they cannot be written.
     let file = experiment(&folder, &[("trials = 6", "trials = 1")]);
     let taken = folder.join("out");

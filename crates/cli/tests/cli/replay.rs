@@ -279,7 +279,7 @@ fn trace_with_rejected_plan_cannot_be_replayed() {
     let replay = elbowroom(&["run", "--replay", &trace.name()]);
     assert_eq!(replay.status.code(), Some(2), "{replay:?}");
     let said = String::from_utf8_lossy(&replay.stderr).replace("\n  ", " ");
-    assert!(said.contains("was refused"), "{said}");
+    assert!(said.contains("was rejected"), "{said}");
 }
 
 /// Runs with recorded traces, by name. `ELBOWROOM_UPDATE_RECORDED=1` writes the traces again, after

@@ -147,7 +147,7 @@ fn signals_shut_down_a_run() {
         assert_eq!(output.status.code(), Some(130), "{name}: {output:?}");
         let text = String::from_utf8_lossy(&output.stdout);
         assert!(
-            text.starts_with("interrupted: asked to end"),
+            text.starts_with("interrupted: stopped on request"),
             "{name}: {text}"
         );
         assert!(text.contains("cancelled"), "{name}: {text}");

@@ -32,7 +32,7 @@ fn unwritable_viewer_file_is_reported_before_the_run() {
     let nowhere = "/nowhere/at/all";
     let tests: [(&[&str], &str); 5] = [
         (&["--perfetto", nowhere], "cannot write /nowhere/at/all"),
-        (&["--realtime", "1", "--serve=east"], "it is no address"),
+        (&["--realtime", "1", "--serve=east"], "expected an address"),
         (
             &["--realtime", "1", "--serve", "--token", nowhere],
             "cannot read the token",

@@ -35,7 +35,7 @@ fn signals_end_a_resumed_executive() {
         let output = again.end();
         assert_eq!(output.status.code(), Some(0), "{name}: {output:?}");
         let report = String::from_utf8_lossy(&output.stdout);
-        assert!(report.contains("asked to end"), "{name}: {report}");
+        assert!(report.contains("stopped on request"), "{name}: {report}");
         let text = fs::read_to_string(&journal).expect("a journal");
         let last = text.lines().last().expect("a record");
         assert!(last.contains("\"interrupted\""), "{name}: {last}");
@@ -83,7 +83,7 @@ fn full_disk_is_reported_to_client_and_in_report() {
     let report = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(
         report.contains("failed: the journal cannot be written")
-            && !report.contains("asked to end"),
+            && !report.contains("stopped on request"),
         "{report}"
     );
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -105,7 +105,7 @@ fn non_file_journal_is_rejected_without_waiting() {
         for path in [&pipe, &place] {
             let (code, said) = ended(&[command, "--resume", &path.display().to_string()]);
             assert_eq!(code, Some(2), "{command}: {said}");
-            assert!(said.contains("is no file"), "{command}: {said}");
+            assert!(said.contains("is not a file"), "{command}: {said}");
         }
     }
     fs::remove_dir_all(&place).expect("the folder is there");

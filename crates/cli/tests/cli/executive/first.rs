@@ -34,7 +34,7 @@ fn errors_are_reported_before_listening() {
         ),
         (
             &["--world-process", "cat", "--journal", &existing],
-            "`elbowroom serve --resume` continues its run",
+            "`elbowroom serve --resume` resumes its run",
         ),
         (
             &["--world-process", &no_program, "--journal", &journal],

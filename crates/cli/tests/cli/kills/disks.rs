@@ -64,7 +64,7 @@ fn full_disk_ends_the_run_in_resumable_state() {
     };
     let text = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(2), "{output:?}");
-    assert!(text.contains("the run was ended in order"), "{text}");
+    assert!(text.contains("the run was shut down"), "{text}");
     let begun = lines(&folder, "begun").len();
     assert!((1..6).contains(&begun), "in the middle: {begun} begun");
     let resume = ["run".to_owned(), "--resume".to_owned(), journal];
@@ -136,7 +136,7 @@ fn run_resumes_after_space_is_freed() {
     }
     let first = lines(&folder, "first").join(" ");
     assert_eq!(lines(&folder, "code"), ["2"], "{first}");
-    assert!(first.contains("the run was ended in order"), "{first}");
+    assert!(first.contains("the run was shut down"), "{first}");
     let half = lines(&folder, "half").len();
     assert!((1..6).contains(&half), "in the middle: {half} begun");
     check_outcome(&folder, &output, "with room again");

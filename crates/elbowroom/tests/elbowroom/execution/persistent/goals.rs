@@ -149,7 +149,7 @@ fn non_persistent_run_rejects_requests() {
         .unwrap_or_else(PoisonError::into_inner)
         .clone();
     assert!(
-        notes.iter().any(|it| it.contains("takes no requests")),
+        notes.iter().any(|it| it.contains("accepts no requests")),
         "{notes:?}"
     );
 }

@@ -10,7 +10,7 @@ use super::scripted::{abandon, assert_has, has, pursue, run_interactive, task};
 fn interactive_run_ends_with_its_goal_and_rejects_others() {
     let task = task("", "(and (have book) (have cup))");
     let told = run_interactive(&task, 100, vec![(5, pursue("key", "(have key)"))]);
-    assert_has(&told, &["takes no other goals", "start"]);
+    assert_has(&told, &["accepts no other goals", "start"]);
     assert_eq!(told.report.verdict, Verdict::GoalReached);
     assert!(!has(&told, "key"), "{:#?}", told.notes);
     assert_eq!(told.plans, 1);
