@@ -32,13 +32,14 @@ class Executive:
         (folder / "token").chmod(0o600)
         world = f"{sys.executable} {HERE / 'world.py'} {folder}"
         begin = [folder / "domain.pddl", folder / "problem.pddl", "--world-process", world]
-        begin += ["--journal", self.journal, "--journal-size", "2M", "--journal-segments", "1000", *options]
+        begin += ["--journal", self.journal, *options]
         self.latencies = []
         self.errors = []
         self.launch(begin)
 
     def launch(self, line):
         line = [self.program, "serve", *line, "--restart-world", "1000000", "--answer-within", "60"]
+        line += ["--journal-size", "500K", "--journal-segments", "1000"]
         line += ["--http", str(self.port), "--token", self.folder / "token"]
         self.stderr = open(self.folder / "stderr.txt", "a", encoding="utf-8")
         self.process = subprocess.Popen([str(it) for it in line], stdout=subprocess.DEVNULL, stderr=self.stderr)

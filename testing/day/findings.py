@@ -67,9 +67,11 @@ def history(truth, fact, initial):
     found, since = [], 0.0 if fact in initial else None
     for entry in truth:
         text = entry.get("start", entry.get("end", "")).strip("()").split()
-        makes = "end" in entry and entry["outcome"] == "succeeded" and (
-            (words[0] == "stored" and text[0] == "unload" and text[2:] == words[1:])
-            or (words[0] == "checked" and text[0] == "check" and text[2:] == words[1:])
+        # A load that fails or is cancelled leaves the tote where it was.
+        maker = {"stored": "unload", "checked": "check"}.get(words[0])
+        makes = "end" in entry and text[2:] == words[1:] and (
+            (text[0] == maker and entry["outcome"] == "succeeded")
+            or (words[0] == "stored" and text[0] == "load" and entry["outcome"] != "succeeded")
         )
         deletes = fact in entry.get("undone", []) or (
             "start" in entry and words[0] == "stored" and text[0] == "load" and text[2:] == words[1:]
