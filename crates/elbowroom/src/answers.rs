@@ -49,10 +49,10 @@ pub use stn::{StnAnswer, StnOutcome, StnRequest};
 pub use violation::ViolationAnswer;
 
 use elbowroom_plan::box_text::BoxTextError;
+use elbowroom_selection::DistributionError;
 use elbowroom_selection::box_search::BoxSearchError;
 
 use crate::pipeline::PipelineError;
-use elbowroom_selection::DistributionError;
 
 /// A reason for a missing answer: the request cannot be understood, or exceeds the analysis.
 #[derive(Debug, thiserror::Error)]

@@ -4,8 +4,8 @@
 use elbowroom_model::Task;
 use elbowroom_sim::WorldModel;
 
-use super::action_model::ActionModel;
-use super::world::{Facts, TimedWorld};
+use super::process::action_model::ActionModel;
+use super::process::world::{Facts, TimedWorld};
 use super::{NotTabulated, Settings};
 
 /// Returns `actions` with as few of `others` as possible, such that all actions stay reachable from

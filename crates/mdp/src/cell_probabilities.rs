@@ -2,9 +2,9 @@
 
 use elbowroom_sim::{Side as Part, rounding_edge};
 
-use super::action_model::{ActionModel, Occurs};
-use super::failures::Ending;
-use super::world::{TimedWorld, unknown_shape};
+use super::process::action_model::{ActionModel, Occurs};
+use super::process::failures::Ending;
+use super::process::world::{TimedWorld, unknown_shape};
 use super::{NotTabulated, Side};
 
 /// Conditional probabilities of happenings in a cell, given that they have not taken place before.

@@ -16,20 +16,17 @@
 //! action that starts in a cell and takes between n and n + 1 cells is ready n cells later, which
 //! is no later than in reality, and may end at any time from then on. This needs far fewer states.
 
-mod postponement;
-mod relaxed_ends;
 mod search;
 
 use elbowroom_sim::Distribution;
 
 use super::Side;
-use super::action_model::Occurs;
 use super::cell_probabilities::{CellProbabilities, NEVER};
+use super::process::action_model::Occurs;
+use super::process::world::{Facts, TimedWorld};
 use super::restricted_policy::constant;
 use super::state::{Phase, State};
-use super::world::{Facts, TimedWorld};
 
-pub(super) use relaxed_ends::{EndClasses, WaitingCache};
 pub(super) use search::{Effort, RestrictedAgent, bounds};
 
 /// Returns the number of cells such that all known times are multiples of a cell; `None` if

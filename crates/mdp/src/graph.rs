@@ -3,11 +3,10 @@
 use std::collections::BTreeMap;
 
 use elbowroom_num::work;
-use indexmap::{IndexMap, IndexSet};
+use indexmap::IndexSet;
 
 use super::Stop;
-use super::state::State;
-use super::world::Facts;
+use super::state::{ReachabilityCache, State};
 
 /// A target of a transition.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -119,9 +118,6 @@ pub(super) const MOST_WAYS: usize = 1 << 16;
 /// Work for each node and each of its ways, in units of [`elbowroom_num::work`].
 const NODE_WORK: u64 = 500;
 const WAY_WORK: u64 = 300;
-
-/// Cache of reachability checks of the goal.
-pub(super) type ReachabilityCache = IndexMap<(Facts, u64, u32), bool>;
 
 /// Converts a count; memory is too small for 2^32 elements.
 fn small(count: usize) -> u32 {

@@ -11,7 +11,7 @@
 //! its planner.
 //!
 //! **Numbers.** For a number that actions change, the state contains an interval of its values
-//! (`value_intervals`). A comparison is an additional fact. In the upper bound it holds if some of the
+//! (`process::value_intervals`). A comparison is an additional fact. In the upper bound it holds if some of the
 //! values satisfy it, in the lower bound if all do. Drawn values are divided into intervals where
 //! they decide a comparison.
 //!
@@ -47,23 +47,18 @@
 //! every agent succeeds in it at least as often. Probabilities are floating-point numbers; the
 //! bounds are widened by 1e-9, which is far more than the rounding errors.
 
-mod action_model;
 mod action_subsets;
-mod applicable;
 mod cell_probabilities;
-mod compile;
 mod discrete_events;
-mod failures;
 mod graph;
 mod lower_bound;
 mod policy;
+pub mod process;
 mod projection;
 mod relaxed_world;
 mod restricted_policy;
 mod state;
 mod upper_bound;
-mod value_intervals;
-mod world;
 
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
@@ -71,21 +66,11 @@ use elbowroom_sim::WorldModel;
 use serde::{Deserialize, Serialize};
 
 pub use action_subsets::supported;
+pub use cell_probabilities::{CellProbabilities, EndProbabilities};
 pub use policy::Policy;
 pub use restricted_policy::RestrictedPolicy;
 
-use action_model::Event;
-use cell_probabilities::CellProbabilities;
-use world::TimedWorld;
-
-/// The compiled process, for programs that write it in another form.
-pub mod process {
-    pub use crate::action_model::{ActionModel, Event, Needs, Snap};
-    pub use crate::cell_probabilities::{CellProbabilities, EndProbabilities};
-    pub use crate::failures::FailureKind;
-    pub use crate::world::{Facts, TimedWorld};
-    pub use crate::{Side, cell_probabilities_of};
-}
+use process::world::TimedWorld;
 
 /// Limits of the computation.
 #[derive(Clone, Debug, PartialEq)]

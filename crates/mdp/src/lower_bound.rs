@@ -4,12 +4,10 @@
 use indexmap::IndexSet;
 
 use super::cell_probabilities::CellProbabilities;
-use super::failures::Ending;
-use super::graph::{
-    Choice, Expansion, Layers, Limits, MOST_WAYS, Nodes, ReachabilityCache, Target,
-};
-use super::state::{Phase, State};
-use super::world::TimedWorld;
+use super::graph::{Choice, Expansion, Layers, Limits, MOST_WAYS, Nodes, Target};
+use super::process::failures::Ending;
+use super::process::world::TimedWorld;
+use super::state::{Phase, ReachabilityCache, State};
 use super::{Side, Stop};
 
 /// Maximum number of happenings in one cell; beyond it, the state counts as lost.

@@ -9,14 +9,12 @@ use elbowroom_sim::{Side as Part, WorldModel};
 use indexmap::{IndexMap, IndexSet};
 
 use super::cell_probabilities::CellProbabilities;
-use super::graph::{
-    Discounts, Expansion, Layers, Limits, ReachabilityCache, Values, backward_induction, solve_cell,
-};
+use super::graph::{Discounts, Expansion, Layers, Limits, Values, backward_induction, solve_cell};
 use super::lower_bound::{DecisionEpochs, LowerBound, Move};
+use super::process::value_intervals::Span;
+use super::process::world::{Facts, TimedWorld};
 use super::restricted_policy::Search;
-use super::state::{Phase, Running, State};
-use super::value_intervals::Span;
-use super::world::{Facts, TimedWorld};
+use super::state::{Phase, ReachabilityCache, Running, State};
 use super::{
     FIRST_STATES_DIVISOR, Grid, NotTabulated, Settings, Side, TimedOptimum, discrete_events, grid,
     refine_bounds,
@@ -377,7 +375,7 @@ impl Policy {
         let now =
             (&self.step * &Rational::from(i64::try_from(standing.period).unwrap_or(0))).to_f64();
         let resolution = self.world.model.resolution.to_f64();
-        let share = |event: &super::action_model::Event| {
+        let share = |event: &super::process::action_model::Event| {
             let share = event.is_over_by(now, Part::AtMost, resolution);
             share.unwrap_or(0.0)
         };

@@ -6,10 +6,10 @@
 //! actions that delete only such facts. Without it, the earliest time of the goal is the same.
 
 use super::Side;
-use super::action_model::{ActionModel, Event};
 use super::cell_probabilities::CellProbabilities;
+use super::process::action_model::{ActionModel, Event};
+use super::process::world::{Facts, TimedWorld};
 use super::state::State;
-use super::world::{Facts, TimedWorld};
 
 impl TimedWorld {
     /// Returns the projection without facts that can be made true for certain without a delay of

@@ -2,9 +2,9 @@
 
 use elbowroom_sim::Distribution;
 
-use super::action_model::Occurs;
-use super::world::TimedWorld;
-use super::{Event, NotTabulated, Settings, Side, bound};
+use super::process::action_model::{Event, Occurs};
+use super::process::world::TimedWorld;
+use super::{NotTabulated, Settings, Side, bound};
 
 impl TimedWorld {
     /// Returns the world without uncertain events that only make facts false. `None` if there are

@@ -12,9 +12,9 @@ use elbowroom_num::Rational;
 use elbowroom_sim::{Distribution, WorldModel};
 use serde::{Deserialize, Serialize};
 
-use super::action_model::Occurs;
 use super::cell_probabilities::CellProbabilities;
 use super::lower_bound::{DecisionEpochs, LowerBound};
+use super::process::action_model::Occurs;
 use super::{ROUNDING_MARGIN, Settings, Side, TimedWorld, graph};
 
 /// A lower bound from a set of actions, each started after a happening.
@@ -241,7 +241,10 @@ pub(super) fn fitting(world: &TimedWorld, cells: usize, side: Side) -> Option<Fi
 }
 
 /// Returns the duration of an action, if it is constant.
-pub(super) fn constant(world: &TimedWorld, act: &super::action_model::ActionModel) -> Option<f64> {
+pub(super) fn constant(
+    world: &TimedWorld,
+    act: &super::process::action_model::ActionModel,
+) -> Option<f64> {
     act.rest.as_ref()?;
     let planned = act.planned.to_f64();
     let time = match world.model.duration_rule(&act.name) {

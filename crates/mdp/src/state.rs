@@ -1,11 +1,15 @@
 //! States of the process: [`State`].
 
+use indexmap::IndexMap;
+
 use super::Side;
-use super::action_model::Snap;
-use super::failures::Ending;
-use super::graph::ReachabilityCache;
-use super::value_intervals::Span;
-use super::world::{Facts, TimedWorld};
+use super::process::action_model::Snap;
+use super::process::failures::Ending;
+use super::process::value_intervals::Span;
+use super::process::world::{Facts, TimedWorld};
+
+/// Cache of reachability checks of the goal.
+pub(super) type ReachabilityCache = IndexMap<(Facts, u64, u32), bool>;
 
 /// A state at the beginning of a cell.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]

@@ -2,16 +2,17 @@
 //! everything happens at known times, states exist only at happenings
 //! ([`stretched`](super::moments)).
 
+mod postponement;
+mod relaxed_ends;
+
 use indexmap::IndexSet;
 
 use super::Stop;
 use super::cell_probabilities::CellProbabilities;
-use super::discrete_events::{EndClasses, WaitingCache};
-use super::graph::{
-    Choice, Expansion, Layers, Limits, MOST_WAYS, Nodes, ReachabilityCache, Target,
-};
-use super::state::{Phase, State};
-use super::world::TimedWorld;
+use super::graph::{Choice, Expansion, Layers, Limits, MOST_WAYS, Nodes, Target};
+use super::process::world::TimedWorld;
+use super::state::{Phase, ReachabilityCache, State};
+use relaxed_ends::{EndClasses, WaitingCache};
 
 pub(super) struct UpperBound<'a> {
     pub(super) world: &'a TimedWorld,

@@ -1,4 +1,4 @@
-//! Cyclic dependencies between modules of a crate.
+//! Cyclic dependencies between modules of a crate, and of a binary in a folder of its own.
 //!
 //! Rust permits cycles inside a crate. The modules of a cycle cannot be understood, tested or moved
 //! separately, so each cycle among a crate's top-level modules must be listed here with its reason.
@@ -43,19 +43,28 @@ fn modules_have_no_unlisted_cycles() {
     for folder in folders(&workspace().join("crates")) {
         let name = folder.file_name().expect("a folder's name");
         let name = name.to_str().expect("plain names");
-        for circle in cycles(&uses(&sources(&folder.join("src")))) {
-            let is_known = ALLOWED_CYCLES.iter().any(|(known, modules, _)| {
-                *known == name
-                    && circle
-                        .iter()
-                        .all(|module| modules.contains(&module.as_str()))
-            });
-            assert!(
-                is_known,
-                "in `{name}`, {circle:?} use each other in a circle: move what ties them, or list \
-                 them above with the reason"
-            );
+        let mut library = sources(&folder.join("src"));
+        library.retain(|path, _| !path.starts_with("bin/"));
+        assert_only_allowed_cycles(name, &library);
+        for binary in folders_in(&folder.join("src/bin")) {
+            assert_only_allowed_cycles(name, &sources(&binary));
         }
+    }
+}
+
+fn assert_only_allowed_cycles(name: &str, sources: &BTreeMap<String, String>) {
+    for circle in cycles(&uses(sources)) {
+        let is_known = ALLOWED_CYCLES.iter().any(|(known, modules, _)| {
+            *known == name
+                && circle
+                    .iter()
+                    .all(|module| modules.contains(&module.as_str()))
+        });
+        assert!(
+            is_known,
+            "in `{name}`, {circle:?} use each other in a circle: move what ties them, or list \
+             them above with the reason"
+        );
     }
 }
 
@@ -282,12 +291,18 @@ fn cycles(uses: &BTreeMap<String, BTreeSet<String>>) -> Vec<BTreeSet<String>> {
     circles
 }
 
+/// Returns the folders of the crates.
 fn folders(folder: &Path) -> Vec<PathBuf> {
-    let entries = fs::read_dir(folder)
-        .expect("the folder of the crates")
-        .flatten();
-    let mut folders: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
+    let mut folders = folders_in(folder);
     folders.retain(|path| path.join("src").is_dir());
+    folders
+}
+
+/// Returns the folders in a folder, which need not exist.
+fn folders_in(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut folders: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
+    folders.retain(|path| path.is_dir());
     folders.sort();
     folders
 }

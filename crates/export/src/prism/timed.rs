@@ -4,10 +4,8 @@ mod modules;
 
 use std::fmt::Write as _;
 
-use elbowroom_mdp::Settings;
-use elbowroom_mdp::process::{
-    ActionModel, CellProbabilities, Event, Facts, Needs, Side, TimedWorld, cell_probabilities_of,
-};
+use elbowroom_mdp::process::{ActionModel, Event, Facts, Needs, TimedWorld};
+use elbowroom_mdp::{CellProbabilities, Settings, Side, cell_probabilities_of};
 use elbowroom_model::Task;
 use elbowroom_sim::WorldModel;
 

@@ -4,9 +4,9 @@
 use super::cells;
 use crate::cell_probabilities::CellProbabilities;
 use crate::lower_bound::{DecisionEpochs, LowerBound};
+use crate::process::world::TimedWorld;
 use crate::restricted_policy::fitting;
 use crate::upper_bound::UpperBound;
-use crate::world::TimedWorld;
 use crate::{
     Grid, NotTabulated, ROUNDING_MARGIN, Settings, Side, Stop, cell_probabilities_of, graph, step,
 };

@@ -2,7 +2,8 @@
 
 use std::fmt::Write as _;
 
-use elbowroom_mdp::process::{ActionModel, EndProbabilities, Facts};
+use elbowroom_mdp::EndProbabilities;
+use elbowroom_mdp::process::{ActionModel, Facts};
 use elbowroom_num::Rational;
 
 use super::super::bare;

@@ -1,6 +1,7 @@
 //! Bridge between Elbowroom on standard input and output and the action performers of `PlanSys2` on
 //! DDS.
 
+mod clock;
 mod command;
 mod expert;
 mod network;

@@ -21,12 +21,12 @@ use elbowroom_plansys2::{
     ActionHandle, Command, Effect, Goals, Hub, Lifecycle, Progress, World, plan_text,
 };
 
+use super::clock::now;
 use super::command::{Planned, Running};
 use super::expert::Expert;
 use super::network::RequestId;
 use super::options::{ServeSettings, Settings};
 use super::services::{EXECUTOR, NODES, Part, ServiceRequest, Services};
-use super::session::now;
 use super::topics::Topics;
 use super::{Input, warn};
 use order::Order;

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use elbowroom_plansys2::{Command, Effect, Hub, PerformerDiscovery, World};
 use serde_json::Value;
 
+use super::clock::now;
 use super::expert::{Expert, ExpertMessage};
 use super::options::Settings;
 use super::topics::Topics;
@@ -218,14 +219,6 @@ impl Session {
     fn now(&self) -> Duration {
         now().saturating_duration_since(self.zero)
     }
-}
-
-#[allow(
-    clippy::disallowed_methods,
-    reason = "robots are on the wall clock; the conversations get it as an argument"
-)]
-pub(super) fn now() -> Instant {
-    Instant::now()
 }
 
 /// Writes lines to Elbowroom. Errors are ignored, because the end of the input reports a closed

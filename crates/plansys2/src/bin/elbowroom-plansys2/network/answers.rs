@@ -7,7 +7,7 @@ use rustdds::no_key::DataWriterCdr;
 use rustdds::{GUID, Timestamp, WriteOptionsBuilder};
 use serde::Serialize;
 
-use super::super::session::now;
+use super::super::clock::now;
 use super::{Framed, RequestId, note_readers};
 
 /// Delay of an answer to a reader that has not been discovered. Then it is sent without waiting any longer.

@@ -9,12 +9,12 @@ use super::applicable::actions;
 use super::compile::Compiler;
 use super::failures::Ending;
 use super::value_intervals::{Number, Span, Test};
-use super::{NotTabulated, Settings, Side as Bounding};
+use crate::{NotTabulated, Settings, Side as Bounding};
 
 /// A set of true facts.
 pub type Facts = u128;
 
-/// A task in a world, as a semi-Markov decision process: see the [crate](super).
+/// A task in a world, as a semi-Markov decision process: see the [crate](crate).
 #[derive(Clone, Debug)]
 pub struct TimedWorld {
     pub(crate) model: WorldModel,
@@ -22,9 +22,9 @@ pub struct TimedWorld {
     pub facts: Vec<FactId>,
     pub(crate) numbers: Vec<Number>,
     /// Comparisons of numbers; their bits come after those of the facts.
-    pub(super) tests: Vec<Test>,
+    pub(crate) tests: Vec<Test>,
     /// The bits of all comparisons.
-    pub(super) tested: Facts,
+    pub(crate) tested: Facts,
     /// The side of the bound, which decides on comparisons that hold for some values only.
     side: Bounding,
     /// The relevant actions.
@@ -147,7 +147,7 @@ impl TimedWorld {
     }
 
     /// Computes the data that depends on the set of actions and events.
-    pub(super) fn compute_changes(&mut self) {
+    pub(crate) fn compute_changes(&mut self) {
         let acts = &self.acts;
         let events = &self.events;
         self.deletable = acts.iter().fold(0, |all, act| all | act.deletes())
@@ -171,7 +171,7 @@ impl TimedWorld {
 
     /// Returns `true` if the goal is reachable from these facts in the delete relaxation, with the
     /// remaining events and the running actions.
-    pub(super) fn can_reach_goal(&self, facts: Facts, under_way: u64, happened: u32) -> bool {
+    pub(crate) fn can_reach_goal(&self, facts: Facts, under_way: u64, happened: u32) -> bool {
         // All comparisons of numbers are assumed to hold.
         let mut facts = facts | self.tested;
         for (index, event) in self.events.iter().enumerate() {
@@ -212,7 +212,7 @@ impl TimedWorld {
 impl TimedWorld {
     /// Returns `true` if an action may be useful. In a monotone world, it is useless if all facts
     /// that it adds are true and stay true.
-    pub(super) fn is_useful(&self, act: usize, facts: Facts) -> bool {
+    pub(crate) fn is_useful(&self, act: usize, facts: Facts) -> bool {
         let adds = self.acts[act].adds();
         !self.is_monotone
             || adds & !facts != 0
@@ -221,7 +221,7 @@ impl TimedWorld {
     }
 
     /// Returns the same world for a bound of this side.
-    pub(super) fn for_bound(&self, side: Bounding) -> Self {
+    pub(crate) fn for_bound(&self, side: Bounding) -> Self {
         Self {
             side,
             ..self.clone()
@@ -230,7 +230,7 @@ impl TimedWorld {
 
     /// Returns the same world without numeric over-all conditions, so that no action is aborted
     /// because of a number.
-    pub(super) fn without_numbers_over_all(&self) -> Result<Self, NotTabulated> {
+    pub(crate) fn without_numbers_over_all(&self) -> Result<Self, NotTabulated> {
         let mut kinder = self.clone();
         for act in &mut kinder.acts {
             if let Some((over_all, _)) = &mut act.rest {
@@ -243,12 +243,12 @@ impl TimedWorld {
     }
 
     /// Returns the facts together with the comparisons that hold for the numbers.
-    pub(super) fn tested(&self, facts: Facts, numbers: &[Span]) -> Facts {
+    pub(crate) fn tested(&self, facts: Facts, numbers: &[Span]) -> Facts {
         self.with_tests(facts, numbers, self.side)
     }
 
     /// Returns the facts that a certain event deletes and that never become true again.
-    pub(super) fn permanently_deleted(&self, event: usize) -> Facts {
+    pub(crate) fn permanently_deleted(&self, event: usize) -> Facts {
         let event = &self.events[event];
         match event.occurs {
             Occurs::Once { probability, .. } if probability >= 1.0 => event.deletes & !self.addable,
@@ -258,7 +258,7 @@ impl TimedWorld {
 
     /// Returns `true` if an event is best applied at once: the world is monotone, and the event
     /// only adds facts that stay true. If a fact can be deleted, a later addition may be better.
-    pub(super) fn is_optimal_at_once(&self, event: usize) -> bool {
+    pub(crate) fn is_optimal_at_once(&self, event: usize) -> bool {
         let event = &self.events[event];
         self.is_monotone && event.deletes == 0 && event.adds & self.deletable == 0
     }
@@ -266,13 +266,13 @@ impl TimedWorld {
     /// Returns `true` if an event is best applied last: the world is monotone, and the event only
     /// deletes facts that stay false. If a fact can be added again, an earlier deletion may be
     /// better.
-    pub(super) fn is_optimal_last(&self, event: usize) -> bool {
+    pub(crate) fn is_optimal_last(&self, event: usize) -> bool {
         let event = &self.events[event];
         self.is_monotone && event.adds == 0 && event.deletes & self.addable == 0
     }
 
     /// Returns `true` if the pending end of an action is best applied at once.
-    pub(super) fn end_is_optimal_at_once(&self, act: usize, ending: Ending, facts: Facts) -> bool {
+    pub(crate) fn end_is_optimal_at_once(&self, act: usize, ending: Ending, facts: Facts) -> bool {
         let act = &self.acts[act];
         let Some((_, end)) = &act.rest else {
             return false;
@@ -290,7 +290,7 @@ impl TimedWorld {
     /// Returns `true` if cancelling an action may be useful for an agent that can do so at any
     /// time: by [`ActionModel::may_be_cancelled`], or because a later end may be better for facts that can
     /// be deleted.
-    pub(super) fn can_gain_by_cancelling(&self, act: usize) -> bool {
+    pub(crate) fn can_gain_by_cancelling(&self, act: usize) -> bool {
         let act = &self.acts[act];
         let gives = act.rest.as_ref().map_or(0, |(_, end)| end.adds);
         act.may_be_cancelled || gives & self.deletable != 0
@@ -380,6 +380,6 @@ impl TimedWorld {
     }
 }
 
-pub(super) fn unknown_shape() -> NotTabulated {
+pub(crate) fn unknown_shape() -> NotTabulated {
     NotTabulated::new("there is a gamma distribution")
 }

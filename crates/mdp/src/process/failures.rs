@@ -2,10 +2,10 @@
 
 use elbowroom_sim::{FactOutcome, FailureRule, FailureTime, Outcome, WorldModel};
 
-use super::NotTabulated;
 use super::action_model::{ActionModel, Snap};
 use super::compile::Compiler;
 use super::world::Facts;
+use crate::NotTabulated;
 
 /// An outcome of a failure.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,7 +22,7 @@ pub struct FailureKind {
 
 /// The end of an action.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub(super) enum Ending {
+pub(crate) enum Ending {
     /// Success, with this draw of the amounts.
     Success(u16),
     /// Failure, with this outcome.
@@ -30,26 +30,26 @@ pub(super) enum Ending {
 }
 
 impl FailureKind {
-    pub(super) fn apply(&self, facts: Facts) -> Facts {
+    pub(crate) fn apply(&self, facts: Facts) -> Facts {
         (facts & !self.deletes) | self.adds
     }
 }
 
 impl ActionModel {
     /// Returns all facts that a failure may make true.
-    pub(super) fn adds_by_failing(&self) -> Facts {
+    pub(crate) fn adds_by_failing(&self) -> Facts {
         let failures = self.failures.iter();
         failures.fold(0, |all, failed| all | failed.adds)
     }
 
     /// Returns all facts that a failure may make false.
-    pub(super) fn deletes_by_failing(&self) -> Facts {
+    pub(crate) fn deletes_by_failing(&self) -> Facts {
         let failures = self.failures.iter();
         failures.fold(0, |all, failed| all | failed.deletes)
     }
 
     /// Returns the outcome of the failure, if it is one.
-    pub(super) fn failed(&self, ending: Ending) -> Option<&FailureKind> {
+    pub(crate) fn failed(&self, ending: Ending) -> Option<&FailureKind> {
         match ending {
             Ending::Success(_) => None,
             Ending::Failure(way) => self.failures.get(usize::from(way)),
@@ -58,7 +58,7 @@ impl ActionModel {
 
     /// Returns `true` if it may have failed already while it is still running, so that it cannot be
     /// cancelled.
-    pub(super) fn can_delay_its_failure(&self) -> bool {
+    pub(crate) fn can_delay_its_failure(&self) -> bool {
         self.failures.iter().any(|failed| failed.delay > 0.0)
     }
 }
@@ -68,7 +68,7 @@ const MOST_WAYS: usize = 64;
 
 impl Compiler<'_> {
     /// Returns the distinct outcomes of an action's failures.
-    pub(super) fn failures(
+    pub(crate) fn failures(
         &self,
         name: &str,
         model: &WorldModel,

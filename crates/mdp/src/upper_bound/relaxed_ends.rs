@@ -9,13 +9,13 @@ use indexmap::IndexMap;
 
 use super::postponement::may_be_better_later;
 use crate::Side;
-use crate::action_model::ActionModel;
 use crate::cell_probabilities::CellProbabilities;
-use crate::failures::Ending;
 use crate::graph::{Choice, Target};
+use crate::process::action_model::ActionModel;
+use crate::process::failures::Ending;
+use crate::process::world::{Facts, TimedWorld};
 use crate::state::{Phase, State};
 use crate::upper_bound::{Cell, Moment};
-use crate::world::{Facts, TimedWorld};
 
 /// Cache of [`may_be_better_later`], by facts, running actions, past events, and the end.
 pub(crate) type WaitingCache = IndexMap<(Facts, u64, u32, usize, Ending), bool>;

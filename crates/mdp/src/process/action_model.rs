@@ -35,7 +35,7 @@ pub struct Snap {
     /// The changes of numbers.
     pub(crate) amounts: Vec<Amount>,
     /// The comparisons that may become true by these changes.
-    pub(super) helped_tests: Facts,
+    pub(crate) helped_tests: Facts,
     /// The possible amounts, with their probabilities; at least one.
     pub(crate) draws: Vec<(f64, Vec<Span>)>,
 }
@@ -83,7 +83,7 @@ pub(crate) enum Occurs {
 }
 
 impl Needs {
-    pub(super) fn holds(&self, facts: Facts) -> bool {
+    pub(crate) fn holds(&self, facts: Facts) -> bool {
         match self {
             Self::All(parts) => parts.iter().all(|part| part.holds(facts)),
             Self::Any(parts) => parts.iter().any(|part| part.holds(facts)),
@@ -94,7 +94,7 @@ impl Needs {
 
     /// Simplifies the condition with the facts fixed: to the values that help it to hold, or, with
     /// `hold` false, to the values that help it to fail.
-    pub(super) fn without(&self, facts: Facts, hold: bool) -> Self {
+    pub(crate) fn without(&self, facts: Facts, hold: bool) -> Self {
         let parts = |parts: &[Self]| parts.iter().map(|part| part.without(facts, hold)).collect();
         match self {
             Self::All(all) => Self::All(parts(all)),
@@ -107,7 +107,7 @@ impl Needs {
     }
 
     /// Returns `true` if the condition may hold if some of the true facts are made false.
-    pub(super) fn is_possible(&self, facts: Facts) -> bool {
+    pub(crate) fn is_possible(&self, facts: Facts) -> bool {
         match self {
             Self::All(parts) => parts.iter().all(|part| part.is_possible(facts)),
             Self::Any(parts) => parts.iter().any(|part| part.is_possible(facts)),
@@ -127,7 +127,7 @@ impl Needs {
     }
 
     /// Returns the facts of the condition if it is a conjunction of facts.
-    pub(super) fn conjunction(&self) -> Option<Facts> {
+    pub(crate) fn conjunction(&self) -> Option<Facts> {
         match self {
             Self::All(parts) => parts
                 .iter()
@@ -148,7 +148,7 @@ impl Needs {
         }
     }
 
-    pub(super) fn has_negation(&self) -> bool {
+    pub(crate) fn has_negation(&self) -> bool {
         match self {
             Self::All(parts) | Self::Any(parts) => parts.iter().any(Self::has_negation),
             Self::Not(_) => true,
@@ -159,18 +159,18 @@ impl Needs {
 
 impl Snap {
     /// Returns `true` if it changes no relevant fact or number.
-    pub(super) fn does_nothing(&self) -> bool {
+    pub(crate) fn does_nothing(&self) -> bool {
         self.adds | self.deletes == 0 && self.amounts.is_empty()
     }
 
     /// Applies the effects on facts; additions win over deletions.
-    pub(super) fn apply(&self, facts: Facts) -> Facts {
+    pub(crate) fn apply(&self, facts: Facts) -> Facts {
         (facts & !self.deletes) | self.adds
     }
 }
 
 impl Event {
-    pub(super) fn apply(&self, facts: Facts) -> Facts {
+    pub(crate) fn apply(&self, facts: Facts) -> Facts {
         (facts & !self.deletes) | self.adds
     }
 
@@ -181,7 +181,7 @@ impl Event {
 
     /// Returns the probability that the event is over at a time, in seconds; 0 for recurrent
     /// events.
-    pub(super) fn is_over_by(&self, time: f64, side: Side, resolution: f64) -> Option<f64> {
+    pub(crate) fn is_over_by(&self, time: f64, side: Side, resolution: f64) -> Option<f64> {
         match &self.occurs {
             Occurs::Once {
                 probability,
@@ -195,42 +195,42 @@ impl Event {
     }
 
     /// Returns `true` if it only makes facts false.
-    pub(super) fn is_harmful(&self) -> bool {
+    pub(crate) fn is_harmful(&self) -> bool {
         self.adds == 0
     }
 }
 
 impl ActionModel {
     /// Returns `true` if its end alone satisfies the goal.
-    pub(super) fn achieves_goal(&self, goal: &Needs) -> bool {
+    pub(crate) fn achieves_goal(&self, goal: &Needs) -> bool {
         self.rest.iter().any(|(_, end)| goal.holds(end.adds))
     }
 
     /// Returns `true` if it has several possible ends.
-    pub(super) fn has_random_ends(&self) -> bool {
+    pub(crate) fn has_random_ends(&self) -> bool {
         let end = self.rest.as_ref();
         self.can_fail() || end.is_some_and(|(_, end)| end.draws.len() > 1)
     }
 
     /// Returns `true` if it may fail after its start.
-    pub(super) fn can_fail(&self) -> bool {
+    pub(crate) fn can_fail(&self) -> bool {
         self.midway_failure > 0.0 || self.end_failure > 0.0
     }
 
     /// Returns `true` if some comparison may become true by it.
-    pub(super) fn can_help(&self) -> bool {
+    pub(crate) fn can_help(&self) -> bool {
         let end = self.rest.as_ref().map_or(0, |(_, end)| end.helped_tests);
         self.start.helped_tests | end != 0
     }
 
     /// Returns `true` if it changes numbers.
-    pub(super) fn changes_numbers(&self) -> bool {
+    pub(crate) fn changes_numbers(&self) -> bool {
         let end = self.rest.as_ref();
         !self.start.amounts.is_empty() || end.is_some_and(|(_, end)| !end.amounts.is_empty())
     }
 
     /// Returns `true` if it changes numbers, or if its over-all or end condition compares numbers.
-    pub(super) fn is_about_numbers(&self, tested: Facts) -> bool {
+    pub(crate) fn is_about_numbers(&self, tested: Facts) -> bool {
         let reads = |needs: &Needs| needs.mentions() & tested != 0;
         let rest = self.rest.as_ref();
         self.changes_numbers()
@@ -238,7 +238,7 @@ impl ActionModel {
     }
 
     /// Returns the facts that it reads.
-    pub(super) fn mentions(&self) -> Facts {
+    pub(crate) fn mentions(&self) -> Facts {
         let rest = self.rest.as_ref();
         let later = rest.map_or(0, |(over_all, end)| {
             over_all.mentions() | end.needs.mentions()
@@ -246,7 +246,7 @@ impl ActionModel {
         self.start.needs.mentions() | later
     }
 
-    pub(super) fn has_negation(&self) -> bool {
+    pub(crate) fn has_negation(&self) -> bool {
         let rest = self.rest.as_ref();
         self.start.needs.has_negation()
             || rest
@@ -254,19 +254,19 @@ impl ActionModel {
     }
 
     /// Returns all facts that it may make true.
-    pub(super) fn adds(&self) -> Facts {
+    pub(crate) fn adds(&self) -> Facts {
         let end = self.rest.as_ref().map_or(0, |(_, end)| end.adds);
         self.start.adds | self.adds_by_failing() | end
     }
 
     /// Returns all facts that it may make false.
-    pub(super) fn deletes(&self) -> Facts {
+    pub(crate) fn deletes(&self) -> Facts {
         let end = self.rest.as_ref().map_or(0, |(_, end)| end.deletes);
         self.start.deletes | self.deletes_by_failing() | end
     }
 
     /// Returns `true` if its end deletes no relevant fact.
-    pub(super) fn has_harmless_end(&self) -> bool {
+    pub(crate) fn has_harmless_end(&self) -> bool {
         self.rest
             .as_ref()
             .is_some_and(|(_, end)| end.deletes & !end.adds == 0)
@@ -274,7 +274,7 @@ impl ActionModel {
 
     /// Returns `true` if the conditions of its end are among its over-all conditions, so that it
     /// can end at any time.
-    pub(super) fn has_guaranteed_end(&self) -> bool {
+    pub(crate) fn has_guaranteed_end(&self) -> bool {
         self.rest.as_ref().is_some_and(|(over_all, end)| {
             let always = over_all.conjunction().unwrap_or(0);
             end.needs
@@ -285,7 +285,7 @@ impl ActionModel {
 
     /// Returns `true` if cancelling it may be useful in a monotone world: its end or its failure
     /// may delete facts, or a restarted action may end earlier than the running one.
-    pub(super) fn can_gain_by_cancelling(&self, model: &WorldModel) -> bool {
+    pub(crate) fn can_gain_by_cancelling(&self, model: &WorldModel) -> bool {
         !self.has_harmless_end()
             || !self.has_guaranteed_end()
             || self.deletes_by_failing() != 0

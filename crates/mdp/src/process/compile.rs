@@ -12,11 +12,11 @@ use elbowroom_model::{Footprint, Task};
 use elbowroom_num::Rational;
 use elbowroom_sim::{Distribution, ExogenousChange, FailureTime, WorldModel};
 
-use super::NotTabulated;
 use super::action_model::{ActionModel, Event, Needs, Occurs, Snap};
 use super::applicable::facts_changed_by_failures;
 use super::value_intervals::{Amount, ChangeOperator, ChangeValue, Number, Test, units};
 use super::world::Facts;
+use crate::NotTabulated;
 
 /// Returns the facts and numbers that the goal depends on, through all actions and their failures.
 fn relevant(
@@ -91,21 +91,21 @@ fn snaps(action: &Action) -> Vec<&SnapAction> {
 }
 
 /// A task, with bits for its relevant facts.
-pub(super) struct Compiler<'t> {
-    pub(super) task: &'t Task,
+pub(crate) struct Compiler<'t> {
+    pub(crate) task: &'t Task,
     model: &'t WorldModel,
     /// The relevant facts, sorted.
-    pub(super) facts: Vec<FactId>,
+    pub(crate) facts: Vec<FactId>,
     /// The relevant numbers that change, sorted by fluent.
-    pub(super) numbers: Vec<Number>,
+    pub(crate) numbers: Vec<Number>,
     /// All numbers that change.
     changing: BTreeSet<FluentId>,
     /// The comparisons found so far.
-    pub(super) tests: RefCell<Vec<Test>>,
+    pub(crate) tests: RefCell<Vec<Test>>,
 }
 
 impl<'t> Compiler<'t> {
-    pub(super) fn new(
+    pub(crate) fn new(
         task: &'t Task,
         model: &'t WorldModel,
         actions: &[Action],
@@ -140,13 +140,13 @@ impl<'t> Compiler<'t> {
         Ok(compiler)
     }
     /// Returns the bit of a fact; 0 if it is irrelevant.
-    pub(super) fn bit(&self, fact: FactId) -> Facts {
+    pub(crate) fn bit(&self, fact: FactId) -> Facts {
         self.facts
             .binary_search(&fact)
             .map_or(0, |place| 1 << place)
     }
 
-    pub(super) fn needs(&self, condition: &Condition) -> Result<Needs, NotTabulated> {
+    pub(crate) fn needs(&self, condition: &Condition) -> Result<Needs, NotTabulated> {
         let all = |parts: &[Condition]| -> Result<Vec<Needs>, NotTabulated> {
             parts.iter().map(|part| self.needs(part)).collect()
         };
@@ -319,7 +319,7 @@ impl<'t> Compiler<'t> {
     }
 
     /// Compiles an action; `None` if it is irrelevant, or never starts.
-    pub(super) fn act(
+    pub(crate) fn act(
         &self,
         action: &Action,
         model: &WorldModel,
@@ -387,7 +387,7 @@ impl<'t> Compiler<'t> {
         self.value(&only.bound).filter(|value| !value.is_negative())
     }
 
-    pub(super) fn events(&self, model: &WorldModel) -> Result<Vec<Event>, NotTabulated> {
+    pub(crate) fn events(&self, model: &WorldModel) -> Result<Vec<Event>, NotTabulated> {
         let mut events = Vec::new();
         for exogenous in &model.exogenous {
             let ExogenousChange::Fact(name, truth) = &exogenous.change else {

@@ -13,7 +13,8 @@ use elbowroom_sim::Rule;
 
 use super::action_model::Snap;
 use super::world::Facts;
-use super::{Side, TimedWorld};
+use super::world::TimedWorld;
+use crate::Side;
 
 /// Units per 1: numbers are stored in millionths.
 const UNIT: i64 = 1_000_000;
@@ -24,15 +25,15 @@ const INFINITE: i64 = 1 << 60;
 /// A closed interval of values, in millionths.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(crate) struct Span {
-    pub(super) low: i64,
-    pub(super) high: i64,
+    pub(crate) low: i64,
+    pub(crate) high: i64,
 }
 
 /// A number that actions change.
 #[derive(Clone, Debug)]
 pub(crate) struct Number {
-    pub(super) fluent: FluentId,
-    pub(super) initial: Span,
+    pub(crate) fluent: FluentId,
+    pub(crate) initial: Span,
     /// Values that are distinguished from larger ones, in order.
     edges: Vec<i64>,
     /// Values that are represented exactly: only constant amounts lead to them.
@@ -41,16 +42,16 @@ pub(crate) struct Number {
 
 /// A comparison, represented as a fact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Test {
-    pub(super) number: usize,
-    pub(super) comparison: ComparisonOperator,
+pub(crate) struct Test {
+    pub(crate) number: usize,
+    pub(crate) comparison: ComparisonOperator,
     /// The bound in millionths.
-    pub(super) bound: i64,
+    pub(crate) bound: i64,
 }
 
 /// Comparison of a number with a bound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum ComparisonOperator {
+pub(crate) enum ComparisonOperator {
     AtMost,
     AtLeast,
     Equal,
@@ -60,14 +61,14 @@ pub(super) enum ComparisonOperator {
 /// Change of a number by a happening.
 #[derive(Clone, Debug)]
 pub(crate) struct Amount {
-    pub(super) number: usize,
-    pub(super) change: ChangeOperator,
-    pub(super) by: ChangeValue,
+    pub(crate) number: usize,
+    pub(crate) change: ChangeOperator,
+    pub(crate) by: ChangeValue,
 }
 
 /// The operator of a change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum ChangeOperator {
+pub(crate) enum ChangeOperator {
     /// The value is assigned.
     Set,
     /// The value is added.
@@ -78,7 +79,7 @@ pub(super) enum ChangeOperator {
 
 /// The value of a change.
 #[derive(Clone, Debug)]
-pub(super) enum ChangeValue {
+pub(crate) enum ChangeValue {
     /// A constant, in millionths.
     Constant(i64),
     /// A random value, drawn by a rule for a planned one.
@@ -86,13 +87,13 @@ pub(super) enum ChangeValue {
 }
 
 /// Returns a number in millionths, if it is a whole number of them.
-pub(super) fn units(value: &Rational) -> Option<i64> {
+pub(crate) fn units(value: &Rational) -> Option<i64> {
     let (whole, one) = (value * &Rational::from(UNIT)).as_small()?;
     (one == 1 && whole.abs() < INFINITE).then_some(whole)
 }
 
 impl Span {
-    pub(super) fn point(value: i64) -> Self {
+    pub(crate) fn point(value: i64) -> Self {
         Self {
             low: value,
             high: value,
@@ -134,7 +135,7 @@ fn sum(left: i64, right: i64) -> i64 {
 
 impl Test {
     /// Creates a comparison with a bound in millionths.
-    pub(super) fn new(number: usize, comparison: Comparison, bound: i64) -> Self {
+    pub(crate) fn new(number: usize, comparison: Comparison, bound: i64) -> Self {
         let (comparison, bound) = match comparison {
             // In whole millionths, a value is below a bound if it is at most the bound minus 1.
             Comparison::Less => (ComparisonOperator::AtMost, bound - 1),
@@ -151,7 +152,7 @@ impl Test {
     }
 
     /// Returns the complementary comparison.
-    pub(super) fn negated(self) -> Self {
+    pub(crate) fn negated(self) -> Self {
         let (comparison, bound) = match self.comparison {
             ComparisonOperator::AtMost => (ComparisonOperator::AtLeast, self.bound + 1),
             ComparisonOperator::AtLeast => (ComparisonOperator::AtMost, self.bound - 1),
@@ -192,7 +193,7 @@ impl Test {
 }
 
 impl Number {
-    pub(super) fn new(fluent: FluentId, initial: i64) -> Self {
+    pub(crate) fn new(fluent: FluentId, initial: i64) -> Self {
         Self {
             fluent,
             initial: Span::point(initial),
@@ -220,12 +221,12 @@ impl Number {
 
 impl Amount {
     /// Returns the position of the number.
-    pub(super) fn number(&self) -> usize {
+    pub(crate) fn number(&self) -> usize {
         self.number
     }
 
     /// Returns `true` if the change may make a false comparison true.
-    pub(super) fn may_help(&self, test: &Test) -> bool {
+    pub(crate) fn may_help(&self, test: &Test) -> bool {
         let rises = match (self.change, &self.by) {
             (ChangeOperator::Set, _) | (_, ChangeValue::Random { .. }) => None,
             (ChangeOperator::Add, ChangeValue::Constant(value)) => Some(*value > 0),
@@ -240,11 +241,11 @@ impl Amount {
     }
 
     /// Returns `true` if it assigns the number.
-    pub(super) fn sets(&self) -> bool {
+    pub(crate) fn sets(&self) -> bool {
         self.change == ChangeOperator::Set
     }
 
-    pub(super) fn is_drawn(&self) -> bool {
+    pub(crate) fn is_drawn(&self) -> bool {
         matches!(self.by, ChangeValue::Random { .. })
     }
 
@@ -260,7 +261,7 @@ impl Amount {
 
 impl TimedWorld {
     /// Returns the facts together with the comparisons that hold for the numbers, for this side.
-    pub(super) fn with_tests(&self, facts: Facts, numbers: &[Span], side: Side) -> Facts {
+    pub(crate) fn with_tests(&self, facts: Facts, numbers: &[Span], side: Side) -> Facts {
         let tests = self.tests.iter().enumerate();
         let holding = tests.filter(|(_, test)| test.holds(numbers[test.number], side));
         let first = self.facts.len();
@@ -270,7 +271,7 @@ impl TimedWorld {
     }
 
     /// Applies the changes of a happening to numbers, with the given draw.
-    pub(super) fn apply_changes(&self, numbers: &mut [Span], snap: &Snap, draw: usize) {
+    pub(crate) fn apply_changes(&self, numbers: &mut [Span], snap: &Snap, draw: usize) {
         for (amount, by) in snap.amounts.iter().zip(&snap.draws[draw].1) {
             let number = amount.number;
             numbers[number] = amount.apply_to(&self.numbers[number], numbers[number], *by);
@@ -279,7 +280,7 @@ impl TimedWorld {
 
     /// Returns the possible intervals of numbers with these values in a state, the most exact
     /// first.
-    pub(super) fn spans_of(&self, values: &[Rational]) -> Option<Vec<Vec<Span>>> {
+    pub(crate) fn spans_of(&self, values: &[Rational]) -> Option<Vec<Vec<Span>>> {
         let mut all = vec![Vec::new()];
         for (number, value) in self.numbers.iter().zip(values) {
             let span = Span::around(value)?;

@@ -1,9 +1,9 @@
 //! Check whether an end may be better after another happening: [`may_be_better_later`].
 
-use crate::action_model::{ActionModel, Needs, Snap};
-use crate::failures::{Ending, FailureKind};
-use crate::value_intervals::Amount;
-use crate::world::{Facts, TimedWorld};
+use crate::process::action_model::{ActionModel, Needs, Snap};
+use crate::process::failures::{Ending, FailureKind};
+use crate::process::value_intervals::Amount;
+use crate::process::world::{Facts, TimedWorld};
 
 /// The changes by a happening.
 #[derive(Clone, Copy, Debug, Default)]

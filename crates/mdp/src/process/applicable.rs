@@ -9,11 +9,11 @@ use elbowroom_model::reachability::{self, Answer};
 use elbowroom_num::Rational;
 use elbowroom_sim::{ExogenousChange, FactOutcome, WorldModel};
 
-use super::{NotTabulated, Settings};
+use crate::{NotTabulated, Settings};
 
 /// Returns all requested actions that can start, under any events. An action that can never end is
 /// in no plan, but the effects of its start may be useful.
-pub(super) fn actions(
+pub(crate) fn actions(
     task: &Task,
     model: &WorldModel,
     settings: &Settings,
@@ -122,7 +122,7 @@ fn grounded(
 }
 
 /// Returns the facts that failures of an action may change, with their new values.
-pub(super) fn facts_changed_by_failures(
+pub(crate) fn facts_changed_by_failures(
     task: &Task,
     model: &WorldModel,
     action: &str,

@@ -7,9 +7,10 @@ use std::collections::BTreeSet;
 use elbowroom_sim::Side as Part;
 
 use super::{Amount, ChangeOperator, ChangeValue, INFINITE, Span, UNIT};
-use crate::action_model::{ActionModel, Snap};
-use crate::world::{Facts, unknown_shape};
-use crate::{NotTabulated, TimedWorld};
+use crate::NotTabulated;
+use crate::process::action_model::{ActionModel, Snap};
+use crate::process::world::TimedWorld;
+use crate::process::world::{Facts, unknown_shape};
 
 /// Maximum number of cuts of a number, or of a random amount.
 const MOST_CUTS: usize = 64;
