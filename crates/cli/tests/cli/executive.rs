@@ -585,7 +585,10 @@ fn wrong_command_line_is_rejected_before_any_effect() {
             &[DOMAIN, PROBLEM, "--socket", &nowhere, "--http", "0"],
             "cannot listen at /nowhere",
         ),
-        (&[DOMAIN, PROBLEM, "--world", "spoiler"], "cannot run on a wall clock"),
+        (
+            &[DOMAIN, PROBLEM, "--world", "spoiler"],
+            "cannot run on a wall clock",
+        ),
         (&[DOMAIN, PROBLEM, "--executor", "nobody"], "nobody"),
         (&[DOMAIN, PROBLEM, "--replay", &nowhere], "--replay"),
     ];

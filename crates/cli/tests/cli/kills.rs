@@ -429,7 +429,10 @@ fn finished_journal_is_neither_overwritten_nor_resumed() {
     let damaged = elbowroom(&["run", "--resume", &journal]);
     let text = String::from_utf8_lossy(&damaged.stderr).into_owned();
     assert!(text.contains("it is damaged: record 4 is intact"), "{text}");
-    assert!(text.contains("help: the records after the damage"), "{text}");
+    assert!(
+        text.contains("help: the records after the damage"),
+        "{text}"
+    );
     // Only if no record is complete, no command can have been sent yet.
     for (kept, expected) in [
         (header.replace('\n', "\r\n"), "its first record is damaged"),

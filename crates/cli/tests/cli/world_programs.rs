@@ -144,7 +144,10 @@ fn conforming_world_passes_all_checks() {
             assert_eq!(with_outcome(&document, "skipped"), skips, "{document:#}");
             let checks = document["checks"].as_array().expect("checks");
             for check in checks.iter().filter(|it| it["outcome"] == "skipped") {
-                assert_eq!(check["why"], json!(["the world does not claim this capability"]));
+                assert_eq!(
+                    check["why"],
+                    json!(["the world does not claim this capability"])
+                );
             }
         }
     }

@@ -220,7 +220,10 @@ fn run_in_failed_world_is_resumed_in_another_one() {
             .contains("has not ended")
     );
     let error = resumed.run().expect_err("its world is missing");
-    assert!(error.to_string().contains("in the executive's process"), "{error}");
+    assert!(
+        error.to_string().contains("in the executive's process"),
+        "{error}"
+    );
     drop(resumed);
 
     let resumed = Executive::resume(&journal, settings).expect("a journal");

@@ -246,7 +246,10 @@ fn unresponsive_and_absent_executives_are_distinguished() {
     let asked = ctl(&["--to", &address, "state"]);
     let said = String::from_utf8_lossy(&asked.stderr).into_owned();
     assert_eq!(asked.status.code(), Some(2), "{said}");
-    assert!(said.contains("accepts connections, but does not answer"), "{said}");
+    assert!(
+        said.contains("accepts connections, but does not answer"),
+        "{said}"
+    );
     drop(stopped);
     let asked = ctl(&["--to", &address, "state"]);
     let said = String::from_utf8_lossy(&asked.stderr).into_owned();

@@ -93,10 +93,7 @@ fn executors_use_world_learnt_from_journals() {
     fs::write(&model, more).expect("written");
     let other = run("closing.pddl", &believing);
     assert_eq!(other.status.code(), Some(0), "{other:?}");
-    assert!(
-        text(&other.stderr).contains("1 section"),
-        "{other:?}"
-    );
+    assert!(text(&other.stderr).contains("1 section"), "{other:?}");
     // The answer contains predictions and observations.
     let journal = folder.join("4.journal").display().to_string();
     let expected = folder.join("expected.toml").display().to_string();

@@ -379,7 +379,7 @@ impl Server {
         let Some(execution) = &mut self.execution else {
             return;
         };
-        execution.ended = Some((super::session::now(), code));
+        execution.ended = Some((super::clock::now(), code));
         // If the run has crashed, its actions are still running.
         for ticket in execution.world.running() {
             self.hub.cancel(ticket | (execution.number << RUN_BITS));
@@ -392,7 +392,7 @@ impl Server {
         let is_due = |it: &mut Execution| {
             it.ended.is_some_and(|(since, _)| {
                 (it.is_silent && is_told)
-                    || super::session::now().saturating_duration_since(since) >= FLUSH_TIMEOUT
+                    || super::clock::now().saturating_duration_since(since) >= FLUSH_TIMEOUT
             })
         };
         let Some(execution) = self.execution.take_if(is_due) else {
@@ -447,7 +447,7 @@ impl Server {
         }
         let lines = execution.world.answer(now);
         send_lines(execution, &lines);
-        let clock = super::session::now();
+        let clock = super::clock::now();
         if execution
             .last_report
             .is_none_or(|at| clock.saturating_duration_since(at) >= REPORT_INTERVAL)
