@@ -346,7 +346,7 @@ mod tests {
         assert!(
             refused("[\"a]").starts_with("text:1:2: error: the text that begins here has no end")
         );
-        assert!(refused("[] []").starts_with("text:1:4: error: there is more text"));
+        assert!(refused("[] []").starts_with("text:1:4: error: unexpected text after the end"));
         assert!(refused(&"[".repeat(100_000)).contains("nested too deeply"));
         assert!(refused("").contains("the end of the text"));
     }

@@ -96,7 +96,7 @@ impl fmt::Display for ViolationKind {
                 now,
             } => write!(
                 f,
-                "has the duration {}, but only {possible} was possible at time {}",
+                "has the duration {}, but is still running at time {}; possible durations: {possible}",
                 decimal(duration),
                 decimal(now)
             ),

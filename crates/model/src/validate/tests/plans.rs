@@ -314,7 +314,7 @@ fn plan_in_mid_execution_continues_running_actions() {
     let mut over = rest.clone();
     over.steps[0].duration = Some(Rational::new(1, 2));
     assert!(
-        said(&situation, &over).contains("it is 1 already"),
+        said(&situation, &over).contains("still running at time 1"),
         "{}",
         said(&situation, &over)
     );
