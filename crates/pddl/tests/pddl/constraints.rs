@@ -151,7 +151,7 @@ fn meaningless_constraints_are_errors() {
     };
     assert!(wrong("(lit)").contains("is not a trajectory constraint"));
     assert!(wrong("(not (always (lit)))").contains("is not a trajectory constraint"));
-    assert!(wrong("(always (sometime (lit)))").contains("cannot be nested"));
+    assert!(wrong("(always (sometime (lit)))").contains("not inside each other"));
     assert!(wrong("(within (lit))").contains("expected `(within time condition)`"));
     assert!(wrong("(within soon (lit))").contains("unknown function `soon`"));
     assert!(wrong("(hold-during 3 2 (lit))").contains("must be later"));

@@ -156,7 +156,7 @@ fn error_messages_name_the_expected_form() {
         ),
         (
             "(collect s9)",
-            "`--vary (collect s9)`: unknown object `s9`; did you mean `S1`?",
+            "`--vary (collect s9)`: there is no object `s9`; did you mean `S1`?",
         ),
         ("navigate", "`--vary navigate`: the plan has no such action"),
         ("beep", "`--vary beep`: `(beep)` is instantaneous"),

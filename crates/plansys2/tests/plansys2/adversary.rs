@@ -309,7 +309,7 @@ fn run(seed: u64) -> BTreeMap<&'static str, u64> {
             ActionUpdate::Cancelled => "cancelled",
             ActionUpdate::Failed(why) if why.contains("no performer answered") => "unanswered",
             ActionUpdate::Failed(why) if why.contains("is lost") => "lost",
-            ActionUpdate::Failed(why) if why.contains("does nothing") => "idle",
+            ActionUpdate::Failed(why) if why.contains("is idle") => "idle",
             ActionUpdate::Failed(why) if why.contains("same action") => "twice",
             ActionUpdate::Failed(_) => "failed",
             other => panic!("{other:?} is no end"),

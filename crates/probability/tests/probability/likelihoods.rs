@@ -269,7 +269,7 @@ fn mistakes_about_failures_are_reported_with_their_place() {
         ),
         (
             &format!("{outcome}probability = 0.5\nbecomes_true = [\"(quiet)\"]"),
-            "text:12:17: error: `quiet` follows from rules",
+            "text:12:17: error: `quiet` is a derived predicate",
         ),
         (
             &format!(

@@ -322,7 +322,7 @@ fn invalid_outcomes_are_rejected() {
     let (line, message) =
         error_of("[[delay]]\naction = \"go\"\nconstant = 1\n[[delay.outcome]]\ndelay = 1\n");
     assert!(
-        line >= 3 && message.contains("`outcome` says nothing"),
+        line >= 3 && message.contains("`outcome` has no meaning"),
         "{line} {message}"
     );
 }
