@@ -65,7 +65,7 @@ fn mistakes_in_the_head_are_refused() {
 fn mistakes_in_windows_are_refused() {
     let window = |rest: &str| wrong(&format!("[[window]]\nfact = \"(open bakery)\"\n{rest}"));
     insta::assert_snapshot!(window("hours = \"8 to 8\""), @"c.toml:9:9: error: the window `8 to 8` is empty; for the whole day, write `0 to 24`");
-    insta::assert_snapshot!(window("hours = \"8-17\""), @"c.toml:9:9: error: `8-17` are no hours; write them like `8 to 17` or `8:30 to 12`");
+    insta::assert_snapshot!(window("hours = \"8-17\""), @"c.toml:9:9: error: `8-17` is not a range of hours; write them like `8 to 17` or `8:30 to 12`");
     insta::assert_snapshot!(window("days = [\"monday\", \"holidys\"]"), @"c.toml:9:8: error: `holidys` is not a day; write `weekdays`, `monday to thursday`, `2026-12-24`, `2026-12-24 to 2027-01-06`, or a name from `[dates]`");
     insta::assert_snapshot!(window("days = 7"), @"c.toml:9:8: error: expected a text in quotes, or a list of texts");
     insta::assert_snapshot!(window(""), @r#"c.toml:7:1: error: the window has neither begin nor end; add `days`, `except`, `hours`, `from` or `to`; `days = "every day"` for all times"#);
@@ -114,7 +114,7 @@ fn mistakes_in_values_are_refused() {
     insta::assert_snapshot!(value("(rate bank)", "value = \"high\""), @"c.toml:9:9: error: expected a number");
     insta::assert_snapshot!(value("(price)", "value = 2"), @"c.toml:8:10: error: the problem itself sets (price) at the beginning; remove it from the problem's `:init`, or from the calendar");
     let twice = "value = 2\n[[value]]\nfluent = \"(rate _)\"\nvalue = 3";
-    insta::assert_snapshot!(value("(rate bank)", twice), @"c.toml:11:10: error: (rate bank) already has a value for all other times; its first [[value]] has no `days`, `hours`, `from` and `to`, and the others have some");
+    insta::assert_snapshot!(value("(rate bank)", twice), @"c.toml:11:10: error: (rate bank) already has a value for all other times; the first [[value]] of a fluent must have none of `days`, `hours`, `from` and `to`; the others must have at least one");
 }
 
 #[test]
