@@ -70,7 +70,7 @@ fn mistakes_in_windows_are_refused() {
     insta::assert_snapshot!(window("days = 7"), @"c.toml:9:8: error: expected a text in quotes, or a list of texts");
     insta::assert_snapshot!(window(""), @r#"c.toml:7:1: error: the window has neither begin nor end; add `days`, `except`, `hours`, `from` or `to`; `days = "every day"` for all times"#);
     insta::assert_snapshot!(window("from = \"2026-12-01T10:00\"\nto = \"2026-12-01T09:00\""), @"c.toml:10:6: error: the window is empty; `to` must be later than `from`");
-    insta::assert_snapshot!(window("value = 3\nhours = \"8 to 9\""), @"c.toml:9:9: error: [[window]] has no `value`; leave it out");
+    insta::assert_snapshot!(window("value = 3\nhours = \"8 to 9\""), @"c.toml:9:9: error: `value` is not a key of [[window]]; leave it out");
     insta::assert_snapshot!(window("hour = \"8 to 9\""), @"c.toml:9:1: error: unknown key `hour`; did you mean `hours`?");
 }
 
@@ -87,7 +87,7 @@ fn calendars_without_measure_are_refused() {
     let many =
         "[[window]]\nfact = \"(open bakery)\"\nhours = [\"8 to 9\", \"10 to 11\", \"12 to 13\"]\n";
     let text = HEAD.replace("3 days", "36000 days") + &many.repeat(3);
-    insta::assert_snapshot!(read_with(&text, None).expect_err("a mistake"), @"c.toml:10:1: error: the calendar has more than 200000 windows; choose a nearer `horizon`, or name fewer objects");
+    insta::assert_snapshot!(read_with(&text, None).expect_err("a mistake"), @"c.toml:10:1: error: the calendar has more than 200000 windows (counted up to here); choose a nearer `horizon`, or name fewer objects");
     assert!(long("9000 days").is_ok());
 }
 
@@ -98,7 +98,7 @@ fn unknown_facts_are_refused() {
     insta::assert_snapshot!(fact("\"(open bakrey)\""), @"c.toml:8:8: error: the problem has no object `bakrey`; did you mean `bakery`?");
     insta::assert_snapshot!(fact("\"(open ann)\""), @"c.toml:8:8: error: the type of `ann` does not match that of `?shop`; give an object of type shop");
     insta::assert_snapshot!(fact("\"(open)\""), @"c.toml:8:8: error: `open` takes 1 arguments, but 0 are given; `_` means any object");
-    insta::assert_snapshot!(fact("\"open\""), @"c.toml:8:8: error: `open` names no fact; write it like `(open bakery)` or `(open _)`");
+    insta::assert_snapshot!(fact("\"open\""), @"c.toml:8:8: error: `open` is not the name of a fact; write it like `(open bakery)` or `(open _)`");
     insta::assert_snapshot!(fact("\"(busy)\""), @"c.toml:8:8: error: `busy` is derived from other facts; give windows for those facts");
     insta::assert_snapshot!(fact("\"(free ann)\""), @"c.toml:8:8: error: the problem itself sets (free ann) at the beginning; remove it from the problem's `:init`, or from the calendar");
     insta::assert_snapshot!(fact("\"(open _)\""), @"c.toml:8:8: error: the problem itself sets (open bank) with a timed initial; remove it from the problem's `:init`, or from the calendar");
