@@ -120,9 +120,7 @@ impl Run<'_> {
         };
         let (now, belief) = (&self.now, &self.belief);
         let is_watched = |goal: &mut OpenGoal| goal.is_watched(now);
-        let mut opened: Vec<OpenGoal> = lasting.queued.extract_if(.., is_watched).collect();
-        // Of goals with equal values that exclude each other, the first one is selected.
-        opened.sort_by_key(|goal| !goal.holds(belief));
+        let opened: Vec<OpenGoal> = lasting.queued.extract_if(.., is_watched).collect();
         let violated = opened.iter().filter(|goal| !goal.holds(belief));
         let names: Vec<String> = violated.map(|goal| format!("`{}`", goal.name)).collect();
         for goal in &opened {
@@ -183,9 +181,9 @@ impl Run<'_> {
     pub(super) fn keep_achieved(&mut self, achieved: Vec<OpenGoal>) -> Vec<OpenGoal> {
         let (kept, others): (Vec<_>, Vec<_>) = achieved.into_iter().partition(|it| it.terms.keep);
         if let Some(lasting) = &mut self.goal_manager {
-            lasting
-                .queued
-                .extend(kept.into_iter().map(OpenGoal::unevaluated));
+            // Before those that they exclude: of goals with equal values, the first one is selected.
+            let kept = kept.into_iter().map(OpenGoal::unevaluated);
+            lasting.queued.splice(0..0, kept);
         }
         others
     }
