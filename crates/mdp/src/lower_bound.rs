@@ -20,8 +20,8 @@ pub(super) enum DecisionEpochs {
     Always,
     /// Moves only after a happening, and at time 0. Useful actions must be started then.
     AfterHappenings,
-    /// The same for worlds where everything happens at [known times](super::moments), without
-    /// cancelling. Only actions that are bits of this number must be started.
+    /// The same for worlds where everything happens at [known times](super::discrete_events),
+    /// without cancelling. Only actions that are bits of this number must be started.
     AtKnownTimes(u64),
 }
 
