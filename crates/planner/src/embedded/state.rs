@@ -90,7 +90,7 @@ pub(crate) struct OpenAction {
     /// The time at which it started, if that is settled.
     pub(crate) start: Ticks,
     pub(crate) least: Ticks,
-    /// [`NEVER`] if there is no bound.
+    /// [`NEVER`] if there means no bound.
     pub(crate) most: Ticks,
     /// The duration, if only one is possible.
     pub(crate) duration: Option<Rational>,
