@@ -235,7 +235,7 @@ fn replace(path: &Path, text: &str) -> io::Result<()> {
     fs::rename(new, path)
 }
 
-/// Learning in a thread of its own: whenever the executive rests, and at the end of the run.
+/// Learning in a separate thread: whenever the executive rests, and at the end of the run.
 pub struct Learning {
     missions: Sender<()>,
     thread: JoinHandle<()>,

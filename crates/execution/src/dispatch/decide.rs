@@ -15,7 +15,7 @@ use crate::window_propagation::WindowPropagation;
 
 /// Instance that was commanded and may be running, although its start was not reported.
 struct UnreportedStart {
-    /// The latest time at which it may be running, on the plan's clock; `None` if there is no
+    /// The latest time at which it may be running, on the plan's clock; `None` if there is not a
     /// limit.
     until: Option<Rational>,
 }

@@ -404,7 +404,7 @@ fn first_line(request: &Request) -> Result<Option<usize>, ApiError> {
     })
 }
 
-/// Methods and paths of the pages. They are no part of the `OpenAPI` document.
+/// Methods and paths of the pages. They are not part of the `OpenAPI` document.
 const PAGE: [(&str, &str); 8] = [
     ("GET", "/"),
     ("GET", "/run"),
