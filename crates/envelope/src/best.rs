@@ -12,7 +12,7 @@
 //! - [`Objective::Volume`]: the same, with linear programs over tangents of the logarithm
 //!   ([`volume`]).
 //! - [`Objective::Probability`]: the same with the logarithm of a probability, and with cases for
-//!   values that have a probability of their own ([`probability`]).
+//!   values that have a positive probability ([`probability`]).
 
 mod barrier;
 mod branch;

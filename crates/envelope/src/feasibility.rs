@@ -289,7 +289,7 @@ impl Feasibility {
         self.network_where(self.edges(), |edge| self.bound(edge, sides, envelope))
     }
 
-    /// Returns the network with these bounds, if it is consistent; `None` is no bound.
+    /// Returns the network with these bounds, if it is consistent; `None` means no bound.
     fn network_where<'a>(
         &self,
         edges: impl Iterator<Item = &'a Edge>,

@@ -170,7 +170,7 @@ fn nodes_of(broken: &Broken, count: usize) -> Vec<NodeId> {
                 }),
         );
     }
-    // The moment inside an over-all condition is no node of the plan.
+    // The moment inside an over-all condition is not a node of the plan.
     nodes.retain(|node| node.index() < count);
     if let Requirement::Condition { node, .. }
     | Requirement::Defined { node, .. }

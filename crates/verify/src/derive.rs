@@ -294,7 +294,7 @@ fn is_not_narrower(
 
 /// The part of a certificate's subject that its answer is compared with.
 pub(crate) struct Derived {
-    /// The quantity of each parameter that is no initial value.
+    /// The quantity of each parameter that is not an initial value.
     pub(crate) quantities: Vec<Quantity>,
     /// The label of each parameter, by position.
     pub(crate) labels: BTreeMap<usize, Label>,

@@ -308,7 +308,7 @@ impl<'a> Speculation<'a> {
         ControlFlow::Continue(())
     }
 
-    /// Takes one step with a check of its own.
+    /// Takes one step with a separate check.
     fn step(
         &mut self,
         on_step: &mut dyn FnMut(Option<&Widening<'_>>) -> ControlFlow<()>,

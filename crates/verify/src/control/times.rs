@@ -68,7 +68,7 @@ pub(super) fn check(
 }
 
 /// Returns the value of a limit that has to hold for all values of its parameter; `None` if there
-/// is no limit.
+/// is not a limit.
 pub(super) fn limit(
     limit: &Limit,
     intervals: &Intervals,
