@@ -46,8 +46,8 @@ impl CommonDenominator {
         Some(())
     }
 
-    /// Returns the number multiplied by the denominator; `None` if that is no whole number, or does
-    /// not fit an `i64`.
+    /// Returns the number multiplied by the denominator; `None` if that is not a whole number, or
+    /// does not fit an `i64`.
     pub fn to_integer(self, number: &Rational) -> Option<i64> {
         let (numerator, own) = number.as_small()?;
         (self.0 % own == 0).then(|| numerator.checked_mul(self.0 / own))?

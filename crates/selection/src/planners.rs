@@ -149,7 +149,7 @@ pub fn planning_work(seconds: &Rational) -> u64 {
     })
 }
 
-/// See [`Embedded::patience`].
+/// See [`Embedded::first_plan_factor`].
 pub(crate) const FIRST_PLAN_FACTOR: u64 = 4;
 
 /// Returns the reason why the embedded planner has no plan after a search of at most `most_states` states.

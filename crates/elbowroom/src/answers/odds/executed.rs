@@ -83,7 +83,7 @@ fn execute_with(
         if watcher.flow().is_break() {
             break;
         }
-        // A task of its own makes each sample independent of the earlier ones.
+        // A separate task makes each sample independent of the earlier ones.
         let task = Arc::new(request.task.with_own_table());
         let seed = request.settings.seed.wrapping_add(sample);
         let report = Execution::of(&task)
