@@ -330,7 +330,7 @@ impl<'a> Run<'a> {
         decided
     }
 
-    /// Makes a decision, and adds its consequences to the agenda.
+    /// Makes a decision, and adds its consequences to the work queue.
     fn decide_and_enqueue(&mut self) -> Result<(), Stop> {
         self.check_stop_request()?;
         self.close_momentary_goals();
@@ -457,8 +457,8 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Requests a look at the goal, which the executor considers reached. The world's answer
-    /// decides.
+    /// Requests an observation of the goal, which the executor considers reached. The world's
+    /// answer decides.
     fn request_goal_look(&mut self) {
         let task = self.belief.task();
         let mut footprint = Footprint::of_condition(task, task.goal());
@@ -472,7 +472,7 @@ impl<'a> Run<'a> {
         self.goal_status_without_plan() == Some(GoalStatus::Reached)
     }
 
-    /// Returns the outlook if the goal holds, or will hold, without further actions.
+    /// Returns the status of the goal if it holds, or will hold, without further actions.
     fn goal_status_without_plan(&self) -> Option<GoalStatus> {
         let is_idle = self.action_log.open_tickets().next().is_none();
         let outlook = is_idle.then(|| self.belief.goal_status());

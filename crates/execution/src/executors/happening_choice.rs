@@ -1,4 +1,5 @@
-//! Choice of the next happening, by orders of a plan or by the table of a small world: [`Chooser`].
+//! Choice of the next happening, by orders of a plan or by the table of a small world:
+//! [`HappeningChooser`].
 
 use std::ops::ControlFlow;
 use std::sync::Arc;

@@ -122,7 +122,7 @@ pub struct ExecutedStep {
 }
 
 impl ActionLog {
-    /// Creates the account of a run that begins in the middle of an execution. It contains only the
+    /// Creates the log of a run that begins in the middle of an execution. It contains only the
     /// running actions.
     pub(super) fn mid_execution(
         belief: &BeliefState,
@@ -162,7 +162,7 @@ impl ActionLog {
         self.started
     }
 
-    /// Restores an account with `started` starts. Starts that are not in `known` are long past.
+    /// Restores a log with `started` starts. Starts that are not in `known` are long past.
     pub(super) fn restore(&mut self, started: usize, known: Vec<KnownStart>) {
         *self = Self {
             started,
@@ -230,8 +230,8 @@ impl ActionLog {
         self.forget_closed();
     }
 
-    /// Clears the account when no action is running and there is no plan. The latest executed steps
-    /// are kept for the report.
+    /// Clears the log when no action is running and there is no plan. The latest executed steps are
+    /// kept for the report.
     pub(super) fn close(&mut self, now: &Rational) {
         if self.entries.is_empty() {
             return;

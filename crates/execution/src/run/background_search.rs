@@ -401,7 +401,7 @@ impl Run<'_> {
         &search.started_at + patience * Rational::from(1_i64 << doublings)
     }
 
-    /// Continues the search, if there is one. Returns `true` if the executor is not to be asked
+    /// Continues the search, if there is one. Returns `true` if the executor makes no decision
     /// because of it.
     pub(super) fn poll_planner(&mut self) -> Result<bool, Stop> {
         if self.is_goal_change_pending() {

@@ -37,7 +37,7 @@ impl ClockWatchdog {
         (self.since.clone(), self.answers)
     }
 
-    /// Restores the state that [`Progress::counted`] returned.
+    /// Restores the state that [`state`](Self::state) returned.
     pub(super) fn restore(&mut self, since: Rational, answers: usize) {
         *self = Self {
             since,

@@ -87,7 +87,7 @@ impl Run<'_> {
     }
 
     /// Switches to a finished plan when it is due, or prepares it. Returns `true` if the executor
-    /// is not to be asked.
+    /// makes no decision now.
     pub(super) fn switch_if_due(&mut self) -> Result<bool, Stop> {
         let Some(search) = &self.search else {
             return Ok(false);
