@@ -278,7 +278,7 @@ impl Growth<'_> {
         let steps = steps(scale, epsilon).into_iter();
         for step in steps.filter(|step| !is_shared || *step >= share) {
             let mut open = ends.clone();
-            // Four steps of one size exceed the next larger one, which was refused unless the end
+            // Four steps of one size exceed the next larger one, which was rejected unless the end
             // is unlimited.
             for _ in 0..MOST_STEPS {
                 open.retain(|&end| self.try_move(end, &step));

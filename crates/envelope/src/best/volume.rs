@@ -71,7 +71,7 @@ impl Volume {
         }
     }
 
-    /// Returns the widths relative to their scales, each with the constant [`foot`] added.
+    /// Returns the widths relative to their scales, each with the constant [`width_offset`] added.
     fn offset_widths<'a>(&'a self, values: &'a [Rational]) -> impl Iterator<Item = Rational> + 'a {
         self.widths.iter().map(|width| {
             let own = width.variables.iter();
