@@ -135,7 +135,7 @@ fn revealed(
     Ok(moments)
 }
 
-/// Splits each moment into the given ways, applying the change of each. If there are too many
+/// Splits each moment into these alternatives, applying the change of each. If there are too many
 /// moments already, they are not split.
 fn split<T>(
     moments: Vec<(f64, Moment)>,

@@ -2,7 +2,7 @@
 //!
 //! A condition that compares a number is an additional fact. In the upper bound it holds if some of
 //! the values satisfy it, in the lower bound if all do. Amounts drawn at an action's end are
-//! divided into intervals where they decide a condition ([`cuts`]).
+//! divided into intervals where they decide a condition (`breakpoints`).
 
 mod breakpoints;
 
@@ -124,7 +124,7 @@ impl Span {
     }
 }
 
-/// Adds two lower or two upper ends; values beyond [`FAR`] are infinite.
+/// Adds two lower or two upper ends; values beyond [`INFINITE`] are infinite.
 fn sum(left: i64, right: i64) -> i64 {
     if left.abs() >= INFINITE {
         left

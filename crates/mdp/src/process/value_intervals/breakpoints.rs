@@ -19,7 +19,8 @@ const MOST_CUTS: usize = 64;
 const MOST_SUMMED: usize = 8;
 
 impl Amount {
-    /// Returns the largest value of the amount that changes the number by at most `way`.
+    /// Returns the largest value of the amount that changes the number by at most `way`, a
+    /// difference in millionths.
     fn cut(&self, way: i64) -> i64 {
         match self.change {
             ChangeOperator::Set | ChangeOperator::Add => way,
