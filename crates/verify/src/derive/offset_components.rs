@@ -1,4 +1,4 @@
-//! Times as functions of few times and parameters: [`Places`].
+//! Times as functions of few times and parameters: [`OffsetComponents`].
 
 use std::collections::{BTreeMap, VecDeque};
 

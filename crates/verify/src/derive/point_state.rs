@@ -1,4 +1,4 @@
-//! Facts and numbers at one moment of a plan: [`Reading`].
+//! Facts and numbers at one moment of a plan: [`PointState`].
 
 use std::cell::OnceCell;
 use std::collections::BTreeMap;
