@@ -28,7 +28,7 @@ pub struct AdversarialWorld {
     timed: Vec<(NodeId, Rational)>,
     /// The running actions.
     running: BTreeMap<ActionHandle, InstanceId>,
-    /// End times of the actions that the spoiler does not control.
+    /// End times of the actions that the adversary does not control.
     ends: BTreeMap<ActionHandle, Rational>,
 }
 

@@ -105,7 +105,8 @@ impl PlanPreparer {
         pipeline::open(task, freed, &specs).map_err(preparation_error)
     }
 
-    /// Returns the orderings that facts require: see [`Need::Orderings`].
+    /// Returns the orderings that facts require: see
+    /// [`PlanForm::Orderings`](elbowroom_execution::PlanForm::Orderings).
     fn orderings(
         task: &Task,
         plan: &TimeTriggeredPlan,
