@@ -1,4 +1,4 @@
-//! Olisipo in the version that made the paper's table: [`AsPublished`].
+//! Olisipo in the version that made the paper's table: [`PublishedExecutor`].
 
 use std::collections::BTreeSet;
 use std::sync::Arc;

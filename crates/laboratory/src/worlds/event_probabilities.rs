@@ -1,4 +1,4 @@
-//! Likelihoods of a task's facts and actions, prepared for sampling: [`Chances`].
+//! Likelihoods of a task's facts and actions, prepared for sampling: [`EventProbabilities`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
