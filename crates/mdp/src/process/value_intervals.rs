@@ -82,11 +82,11 @@ pub(crate) enum ChangeOperator {
 pub(crate) enum ChangeValue {
     /// A constant, in millionths.
     Constant(i64),
-    /// A random value, drawn by a rule for a planned one.
+    /// A random value: drawn by a rule of the world file that applies to a planned value.
     Random { rule: Rule, planned: f64 },
 }
 
-/// Returns a number in millionths, if it is a whole number of them.
+/// Returns a number in millionths; `None` if that is not a whole number.
 pub(crate) fn units(value: &Rational) -> Option<i64> {
     let (whole, one) = (value * &Rational::from(UNIT)).as_small()?;
     (one == 1 && whole.abs() < INFINITE).then_some(whole)
