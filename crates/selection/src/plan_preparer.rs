@@ -336,7 +336,7 @@ impl RegionOracle for ExactRegion {
         Some(explainer.objection(&oracle, &envelope, &objection).reason)
     }
 
-    /// Runs IRR nearby and in small steps.
+    /// Runs IRR with a small initial step, so that it stays near the values.
     fn surroundings(
         &mut self,
         task: &Arc<Task>,

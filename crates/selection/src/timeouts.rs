@@ -16,7 +16,7 @@ pub fn timeouts(plan: &ParametrizedPlan, rule: &TimeoutRule) -> Vec<Option<Ratio
     timeouts
 }
 
-/// Returns the mistake, for users, if a rule is about an action that the problem does not have.
+/// Returns an error message for users if a rule names an action that the problem does not have.
 pub fn unknown_action(rule: &TimeoutRule, problem: &Problem) -> Option<String> {
     let is_known = |name: &str| {
         let inner = name
