@@ -265,7 +265,7 @@ impl Dispatch {
 
     /// Returns the latest end of a running action with which the remaining plan has a schedule, on
     /// the world's clock. Contingent links may take any time within their reading. `None` if there
-    /// is not a limit, or no schedule. Takes time in proportion to the plan.
+    /// is no limit, or no schedule. Takes time in proportion to the plan.
     pub(crate) fn latest_end(
         &self,
         id: InstanceId,

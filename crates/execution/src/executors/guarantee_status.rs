@@ -18,7 +18,7 @@ use crate::reason::{Cause, GuaranteeLevel, Reason, Subject};
 /// makes up for that.
 const ENVELOPE_SHARES: [i64; 7] = [16, 15, 12, 8, 4, 2, 1];
 
-/// A reading of each constraint of a plan.
+/// The role of each constraint of a plan.
 type Readings<'a> = dyn Fn(&Constraint) -> ConstraintRole + 'a;
 
 /// Possible values of [`slack`] in sixteenths, the greatest first.

@@ -147,8 +147,8 @@ pub(super) struct SearchResults {
     pub(super) inquiry: DoubtInquiry,
     /// The plan that the executor abandoned, until another one is adopted.
     pub(super) abandoned: Option<AbandonedPlan>,
-    /// The time at which no plan was found and the executor carried on, and the verdict otherwise;
-    /// `None` after the next event.
+    /// The time at which no plan was found and the executor continued, and the verdict that applies
+    /// if it stops; `None` after the next event.
     pub(super) failed_at: Option<(Rational, Verdict)>,
     /// `true` if a search for a better plan has used up its budget. No other one begins until there is a new plan.
     pub(super) has_better_search_failed: bool,
@@ -469,7 +469,7 @@ impl Run<'_> {
         }
     }
 
-    /// Waits for the plan if only running actions continue. Returns `true` if it does.
+    /// Waits for the plan if only running actions continue. Returns `true` if the run waits.
     fn is_waiting_for_plan(&mut self) -> bool {
         let search = self.search.as_ref();
         let waits = search
@@ -565,7 +565,7 @@ impl Run<'_> {
         }
     }
 
-    /// Continues if there is no plan from a situation in which nothing more is started.
+    /// Handles the absence of a plan from a situation in which no further action is started.
     fn handle_missing_plan(
         &mut self,
         search: &BackgroundSearch,

@@ -46,7 +46,7 @@ impl Run<'_> {
         self.switch_unfitted(search, plan)
     }
 
-    /// Switches to the plan as it was made.
+    /// Switches to the unchanged plan.
     pub(in crate::run) fn switch_unfitted(
         &mut self,
         search: BackgroundSearch,
