@@ -50,7 +50,7 @@ pub struct InterruptedRun {
     length: u64,
     stored: Stored,
     spec: RunSpec,
-    /// The journal, once it is opened.
+    /// The journal; `None` until it is opened.
     file: Option<JournalFile>,
 }
 
