@@ -74,7 +74,7 @@ pub enum Shortfall {
 }
 
 impl Shortfall {
-    /// Returns the number; `None` if there is not a limit.
+    /// Returns the number; `None` if there is no limit.
     pub fn value(&self) -> Option<&Rational> {
         match self {
             Self::Time(value) | Self::Amount(value) => Some(value),
@@ -193,7 +193,7 @@ impl<'a> Explainer<'a> {
     }
 
     /// Gives the example a schedule where `first` comes as late as possible relative to `second`,
-    /// or 1 later if there is not a limit.
+    /// or 1 later if there is no limit.
     fn delay_first(
         &self,
         example: &mut Counterexample,

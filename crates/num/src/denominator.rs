@@ -26,8 +26,8 @@ impl Default for CommonDenominator {
 }
 
 impl CommonDenominator {
-    /// Returns the least common denominator of these numbers; `None` if it does not fit an `i64`,
-    /// or one of them does not.
+    /// Returns the least common denominator of these numbers; `None` if it, or one of the numbers,
+    /// does not fit an `i64`.
     pub fn of<'a>(numbers: impl IntoIterator<Item = &'a Rational>) -> Option<Self> {
         let mut common = Self::default();
         for number in numbers {

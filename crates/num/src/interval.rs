@@ -24,7 +24,7 @@ impl End {
         }
     }
 
-    /// Returns `true` if there is not a limit on this side.
+    /// Returns `true` if there is no limit on this side.
     pub fn is_infinite(&self) -> bool {
         matches!(self, End::Infinite)
     }

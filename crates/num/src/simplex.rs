@@ -64,7 +64,7 @@ impl VariableId {
 #[error("{} bounds contradict each other", .certificate.len())]
 pub struct Infeasible {
     /// Tags in ascending order with their multipliers, which are positive. Without any one of them,
-    /// there is not a contradiction.
+    /// there is no contradiction.
     pub certificate: Vec<(usize, Rational)>,
 }
 

@@ -166,7 +166,7 @@ pub struct Bar {
     pub actual: Option<(f64, f64)>,
     /// Outcome: `succeeded`, `failed`, `cancelled`, `running`, or empty.
     pub outcome: &'static str,
-    /// Earliest and latest start; `None` where there is not a limit.
+    /// Earliest and latest start; `None` where there is no limit.
     pub starts: Option<(Option<f64>, Option<f64>)>,
     /// Earliest and latest end.
     pub ends: Option<(Option<f64>, Option<f64>)>,

@@ -109,7 +109,7 @@ pub struct RunSpec {
     /// Maximum number of these states for a better plan than the first.
     pub improve_states: u64,
     /// Work limit for each choice of the first plan and each new plan, in seconds of one processor
-    /// ([`elbowroom_num::work`]); left out if there is not a limit.
+    /// ([`elbowroom_num::work`]); left out if there is no limit.
     #[serde(default, with = "positive::option")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub planning_budget: Option<Rational>,

@@ -105,7 +105,7 @@ impl Sum {
         self
     }
 
-    /// Subtracts `sign` times a limit. Returns `None` if there is not a limit.
+    /// Subtracts `sign` times a limit. Returns `None` if there is no limit.
     fn minus_limit(mut self, limit: &Limit, sign: i64) -> Option<Self> {
         match limit {
             Limit::None => return None,

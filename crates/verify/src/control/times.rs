@@ -68,7 +68,7 @@ pub(super) fn check(
 }
 
 /// Returns the value of a limit that has to hold for all values of its parameter; `None` if there
-/// is not a limit.
+/// is no limit.
 pub(super) fn limit(
     limit: &Limit,
     intervals: &Intervals,

@@ -144,8 +144,7 @@ fn reasons(settings: &BestSettings, proof: &BestProof, cuts: &mut Cuts) -> Reaso
 }
 
 /// Returns the largest deviation at which an end of the variable still increases the objective, or
-/// `None` if there is not a limit. If it is the smaller one, it limits the variable instead of
-/// `most`.
+/// `None` if there is no limit. If it is the smaller one, it limits the variable instead of `most`.
 fn greatest_gain(
     plan: &ParametrizedPlan,
     settings: &BestSettings,

@@ -23,7 +23,8 @@ const CACHE_SIZE: usize = 2000;
 pub struct ExecutedAnswer {
     /// The executor.
     pub executor: String,
-    /// `true` if new plans were made, by the embedded planner and in no simulated time.
+    /// `true` if new plans were allowed. The embedded planner makes them, and planning takes no
+    /// simulated time.
     pub replans: bool,
     /// Number of samples.
     pub samples: u64,
