@@ -376,7 +376,7 @@ impl DurationAssumptions<'_> {
             return ConstraintRole::Contingent { lower, upper };
         };
         // An action may have exceeded its share and still be inside the envelope. Then the share
-        // applies to the rest of its interval.
+        // applies to the remaining part of its interval.
         let has_had_it = upper.as_ref().is_some_and(|upper| *upper < elapsed);
         let upper = if self.is_inside && has_had_it {
             let all = self.interval(parameter, &Rational::ONE).1;

@@ -62,7 +62,7 @@ struct Live {
     /// The comparison of plans, and the advantage that another plan must have.
     comparator: Option<(Box<dyn PlanComparator>, Rational)>,
     state: Option<ExecutedPlan>,
-    /// Reduction of the planned durations with which the last abandoned plan might still succeed.
+    /// Reduction of the planned durations that the last abandoned plan needs to succeed.
     reduction: ReductionClass,
     /// A plan that is executed without a guarantee.
     unguaranteed: Option<UnguaranteedPlan>,

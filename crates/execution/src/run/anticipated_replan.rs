@@ -23,7 +23,7 @@ pub(super) struct AnticipatedReplan {
     pub(super) prospect: PredictedState,
     /// The time of the forecast.
     pub(super) since: Rational,
-    /// The time from which a new plan is needed.
+    /// The earliest time at which a new plan is needed.
     until: Rational,
     /// `true` if an unexpected event has happened since.
     is_outdated: bool,

@@ -565,7 +565,7 @@ impl Run<'_> {
         }
     }
 
-    /// Handles the absence of a plan from a situation in which no further action is started.
+    /// Handles the answer that no plan exists from a situation without further starts.
     fn handle_missing_plan(
         &mut self,
         search: &BackgroundSearch,

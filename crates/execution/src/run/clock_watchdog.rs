@@ -17,7 +17,7 @@ const ANSWERS_PER_STEP: usize = 10;
 /// [`RunSettings::time_limit`](super::RunSettings::time_limit).
 #[derive(Clone, Debug, Default)]
 pub(super) struct ClockWatchdog {
-    /// Time from which answers are counted.
+    /// Start time of the count of answers.
     since: Rational,
     answers: usize,
     /// The last message since then that could not be read, with the reason.
@@ -32,7 +32,7 @@ impl ClockWatchdog {
         self.unintelligible = None;
     }
 
-    /// Returns the time from which answers are counted, and their number.
+    /// Returns the start time of the count of answers, and the number of answers since then.
     pub(super) fn state(&self) -> (Rational, usize) {
         (self.since.clone(), self.answers)
     }

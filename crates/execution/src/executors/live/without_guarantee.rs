@@ -93,9 +93,9 @@ impl UnguaranteedPlan {
 }
 
 impl ExecutedPlan {
-    /// Returns the reduction of planned durations with which the remaining plan might still
-    /// succeed, after this reason to abandon it. Insufficient numbers may still suffice if
-    /// durations deviate favourably.
+    /// Returns the reduction of planned durations that the remaining plan needs to succeed, after
+    /// this reason to abandon it. Insufficient numbers may still suffice if durations deviate
+    /// favourably.
     pub(super) fn reduction_class(&self, reason: &Reason, now: &Rational) -> ReductionClass {
         let lacks_numbers = matches!(
             (reason.cause, &reason.about),
