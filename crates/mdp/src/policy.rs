@@ -23,8 +23,8 @@ use super::{
 /// Table of the values of all states on the grid of the lower bound, for evaluating each move.
 ///
 /// An agent that always makes the most valuable move at the boundaries of cells succeeds with a
-/// probability of at least [`TimedOptimum::lower`]. There are two deviations: the policy gives up
-/// at most a ten-thousandth to succeed earlier, and the process ignores the separation of
+/// probability of at least [`TimedOptimum::lower`]. There are two deviations: the policy accepts a
+/// loss of at most a ten-thousandth to succeed earlier, and the process ignores the separation of
 /// happenings by ε.
 #[derive(Debug)]
 pub struct Policy {

@@ -101,7 +101,7 @@ pub struct InstanceLine {
     pub action: String,
 }
 
-/// `lower <= to - from <= upper`; `None` where there means no bound.
+/// `lower <= to - from <= upper`; `None` where there is no bound.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ConstraintLine {

@@ -42,7 +42,7 @@ impl<W: Weight> ShortestPaths<W> {
     }
 
     /// Returns the constraints whose sum is the bound, from the beginning of the path to its end;
-    /// `None` when there means no bound.
+    /// `None` when there is no bound.
     pub fn path(&self, node: NodeId) -> Option<Vec<ConstraintId>> {
         self.distance(node)?;
         let mut path = Vec::new();

@@ -90,7 +90,7 @@ pub(crate) struct OpenAction {
     /// The time at which it started, if that is settled.
     pub(crate) start: Ticks,
     pub(crate) least: Ticks,
-    /// [`NEVER`] if there means no bound.
+    /// [`NEVER`] if there is no bound.
     pub(crate) most: Ticks,
     /// The duration, if only one is possible.
     pub(crate) duration: Option<Rational>,
@@ -269,7 +269,7 @@ impl State {
     }
 
     /// Returns `true` if all settled happenings were no later than in the other state, and the
-    /// unsettled ones can be as early. Both must be discretely the same.
+    /// unsettled ones can be as early. Precondition: the two states differ only in times.
     pub(crate) fn has_no_later_annotations_than(&self, other: &Self) -> bool {
         if self.settled_end > other.settled_end {
             return false;

@@ -59,8 +59,8 @@ pub struct HappeningAnswer {
     /// The earliest time; `None` if the order is inconsistent with durations and timed initials.
     #[serde(with = "exact::option")]
     pub earliest: Option<Rational>,
-    /// The latest time; `None` if there means no bound, or if the order is inconsistent with
-    /// durations and timed initials.
+    /// The latest time; `None` if there is no bound, or if the order is inconsistent with durations
+    /// and timed initials.
     #[serde(with = "exact::option")]
     pub latest: Option<Rational>,
     /// Probability that everything up to here succeeds, and that the actions running then can

@@ -34,7 +34,7 @@ pub(crate) struct KnownEnd {
     /// The earliest and the latest time in the network.
     pub(crate) rounded: (Ticks, Ticks),
     pub(crate) earliest: Rational,
-    /// `None` if there means no bound.
+    /// `None` if there is no bound.
     pub(crate) latest: Option<Rational>,
 }
 

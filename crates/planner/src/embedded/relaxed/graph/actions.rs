@@ -204,7 +204,7 @@ pub(super) fn least_ticks(compiled: &Compiled, action: &Action) -> Ticks {
 }
 
 /// Returns the greatest duration of an action, where it does not depend on the state; [`NEVER`] if
-/// there means no bound.
+/// there is no bound.
 pub(super) fn most_ticks(compiled: &Compiled, action: &Action) -> Ticks {
     let most = action.duration.most.as_ref();
     most.map_or(NEVER, |most| compiled.scale.ceil(most).0)
