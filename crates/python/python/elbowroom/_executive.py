@@ -75,7 +75,8 @@ class Executive(BackgroundRun):
                 event loop.
             journal: a new file, from which :meth:`resume` continues after a crash. For worlds in Python, and for
                 ``world_process="COMMAND"``.
-            learn: a folder for logs and for ``world.toml``, the model learnt from the journal whenever the executive is idle and at the end
+            learn: a folder for logs and for ``world.toml``, the model learnt from the journal when the executive is idle
+                and at the end
                 (``docs/learning.md``). ``believed=`` is the model that the executor believes.
             executor: the name of the executor; :func:`elbowroom.executors` lists them.
             planner: ``"embedded"``, another planner's name, or a command line.
@@ -190,7 +191,8 @@ class Executive(BackgroundRun):
             within: the same in seconds from now.
             release: the time from which it is pursued, on the world's clock; it is queued until then.
             after: the same in seconds from now.
-            keep: ``True`` for a goal that is achieved again whenever it does not hold and no other goal is pursued, until it is cancelled.
+            keep: ``True`` for a goal that is achieved again whenever it does not hold and no other goal is pursued, until it
+                is cancelled.
             by: name of the client, for the records.
 
         Returns:

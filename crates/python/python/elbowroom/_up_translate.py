@@ -306,7 +306,7 @@ class Translation:
         return ActionInstance(self.actions[name], tuple(objects))
 
     def plan_back(self, steps: Iterable[Any]) -> Any:
-        """Converts a plan of the translation to a sequential plan if the problem has no time, otherwise to a time-triggered one."""
+        """Converts a plan of the translation to a sequential plan (without time) or a time-triggered one."""
         made = [
             (s.start, self.instance(s.action), s.duration)
             for s in steps

@@ -280,7 +280,7 @@ class _Parts:
             path = self.path(shard)
             _keep(path, results)
             # In the format of `sha256sum`. The sum is written last: a part with an older sum is
-            # made again.
+            # computed again.
             _keep(_sum_of(path), f"{hashlib.sha256(results.encode()).hexdigest()}  {path.name}\n")
 
     def missing(self) -> list[int]:
