@@ -126,7 +126,7 @@ def _start_effects(words: list[str]) -> Iterator[tuple[str, bool]]:
 
 
 def _undone(words: list[str]) -> Iterator[tuple[str, bool]]:
-    """Reports the facts after a failed or cancelled action: those before the action."""
+    """Returns the facts that a failed or cancelled action changed, with their values before it."""
     return ((fact, not becomes) for fact, becomes in _start_effects(words))
 
 
