@@ -240,7 +240,8 @@ def main():
     )
     claims = node.create_publisher(String, "elbowroom/claims", latched)
     claim = Claim(lambda text: claims.publish(String(data=text)))
-    if "--shared" not in sys.argv[1:]:
+    is_shared = "--shared" in sys.argv[1:]
+    if not is_shared:
         node.create_subscription(String, "elbowroom/claims", lambda it: claim.check(it.data), latched)
         node.create_timer(0.2, claim.tick)
     executor = SingleThreadedExecutor()
@@ -258,7 +259,8 @@ def main():
     time.sleep(1.2)
     if claim.refusal is None:
         print(f"performers: {', '.join(hub.performers()) or 'none'}", file=sys.stderr)
-        claim.hold()
+        if not is_shared:
+            claim.hold()
         world = World("plansys2", speed=float(os.environ.get("ELBOWROOM_SPEED", "1")))
         world.starter("*")(hub.begin)
         world.canceller(hub.cancel)

@@ -11,6 +11,7 @@ import json
 import pathlib
 import random
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -80,6 +81,8 @@ class Shift:
         try:
             self.work()
             self.end()
+            if hostile.poll() is not None:
+                self.findings.broken("the hostile readers have ended")
         finally:
             hostile.kill()
             if self.executive.process.poll() is None:
@@ -224,6 +227,8 @@ def compare_predictions(chosen, folder):
 
 
 def main():
+    # So that the processes of this program end with it.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     chosen = arguments()
     folder = chosen.keep or pathlib.Path(tempfile.mkdtemp(prefix="day-"))
     if chosen.keep:

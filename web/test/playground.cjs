@@ -125,7 +125,7 @@ test("options are those of the command line", async () => {
   await says(tab, "The region was found");
   const region = await answer(tab);
   const { pieces } = JSON.parse(run("envelope", ...pddl("delivery"), plan, "--method", "exact", "--json"));
-  const rows = region.locator("section", { has: region.locator("h2", { hasText: "What the values satisfy" }) }).locator("tbody tr");
+  const rows = region.locator("section", { has: region.locator("h2", { hasText: "Inequalities" }) }).locator("tbody tr");
   assert.deepEqual((await cellsOf(rows)).map((row) => row[0]), pieces[0].rows.map((row) => row.text));
   await tab.locator("#options").fill("--metod best");
   await press(tab, "Envelope");
@@ -146,7 +146,7 @@ test("a run with a seed is the run of the command, and its page goes through tim
     const frame = await answer(tab);
     const done = spawnSync(elbowroom, ["run", ...pddl("delivery"), plan, "--world", world, "--seed", String(seed), "--executor", "live", "--json"], { encoding: "utf8" });
     const { executed } = JSON.parse(done.stdout);
-    const table = frame.locator("section", { has: frame.locator("h2", { hasText: "Planned and done" }) });
+    const table = frame.locator("section", { has: frame.locator("h2", { hasText: "Planned and actual times" }) });
     const cells = await cellsOf(table.locator("tbody tr"));
     // The table also has the steps that were never started, without a time.
     const started = cells.filter((row) => /^\d/.test(row[2]));

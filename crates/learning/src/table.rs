@@ -233,8 +233,11 @@ mod tests {
             ("(a),1,inf,succeeded", "expected seconds"),
             ("(a),1,2,done", "unknown outcome `done`"),
             (",1,2,succeeded", "expected an action"),
-            ("(a),,2,succeeded", "has a start"),
-            ("(a),,2,failed", "neither a start nor a command"),
+            ("(a),,2,succeeded", "needs a start"),
+            (
+                "(a),,2,failed",
+                "both the start and the command are missing",
+            ),
         ] {
             let said = said(&format!("{head}{row}\n"));
             assert!(said.contains(part), "{row}: {said}");

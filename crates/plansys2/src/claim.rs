@@ -14,12 +14,16 @@ const PROBATION: Duration = Duration::from_secs(5);
 /// States of a claim, in order of priority.
 const STATES: [&str; 3] = ["waiting", "new", "established"];
 
+/// State of a claim whose executor ends. Others ignore it.
+const RELEASED: &str = "released";
+
 /// Claim of this executor.
 #[derive(Debug)]
 pub struct Claim {
     id: String,
     name: String,
     held_since: Option<Duration>,
+    is_released: bool,
 }
 
 impl Claim {
@@ -30,6 +34,7 @@ impl Claim {
             id: id.to_owned(),
             name: name.to_owned(),
             held_since: None,
+            is_released: false,
         }
     }
 
@@ -38,9 +43,19 @@ impl Claim {
         self.held_since.get_or_insert(now);
     }
 
+    /// Gives up the claim, so that another executor can start at once.
+    pub fn release(&mut self) {
+        self.is_released = true;
+    }
+
     /// Returns the text to publish whenever it has changed: state, identifier and name.
     pub fn text(&self, now: Duration) -> String {
-        format!("{} {} {}", STATES[self.state(now)], self.id, self.name)
+        let state = if self.is_released {
+            RELEASED
+        } else {
+            STATES[self.state(now)]
+        };
+        format!("{state} {} {}", self.id, self.name)
     }
 
     /// Takes the claim of an executor. Its own claim and texts of another form are ignored.
@@ -122,6 +137,14 @@ mod tests {
         assert!(new.check(&established.text(now), now).is_err());
         assert_eq!(established.check(&new.text(now), now), Ok(()));
         assert_eq!(established.check(&held("a", 0).text(now), now), Ok(()));
+    }
+
+    #[test]
+    fn released_claims_have_no_priority() {
+        let mut first = held("a", 0);
+        first.release();
+        let waiting = Claim::new("b", "two");
+        assert_eq!(waiting.check(&first.text(seconds(9)), seconds(9)), Ok(()));
     }
 
     #[test]

@@ -127,7 +127,7 @@ def test_an_execution_refuses_what_it_has_not_asked_for(
 ) -> None:
     execution = problem.execution(plan)
     assert isinstance(execution.next_command(), elbowroom.Start)
-    with pytest.raises(elbowroom.RequestError, match="has not asked"):
+    with pytest.raises(elbowroom.RequestError, match="has not requested"):
         execution.observe(1)
     execution.fail("the robot is gone")
     over = execution.next_command()

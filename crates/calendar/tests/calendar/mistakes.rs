@@ -65,12 +65,12 @@ fn mistakes_in_the_head_are_refused() {
 fn mistakes_in_windows_are_refused() {
     let window = |rest: &str| wrong(&format!("[[window]]\nfact = \"(open bakery)\"\n{rest}"));
     insta::assert_snapshot!(window("hours = \"8 to 8\""), @"c.toml:9:9: error: the window `8 to 8` is empty; for the whole day, write `0 to 24`");
-    insta::assert_snapshot!(window("hours = \"8-17\""), @"c.toml:9:9: error: `8-17` are no hours; write them like `8 to 17` or `8:30 to 12`");
+    insta::assert_snapshot!(window("hours = \"8-17\""), @"c.toml:9:9: error: `8-17` is not a range of hours; write them like `8 to 17` or `8:30 to 12`");
     insta::assert_snapshot!(window("days = [\"monday\", \"holidys\"]"), @"c.toml:9:8: error: `holidys` is not a day; write `weekdays`, `monday to thursday`, `2026-12-24`, `2026-12-24 to 2027-01-06`, or a name from `[dates]`");
     insta::assert_snapshot!(window("days = 7"), @"c.toml:9:8: error: expected a text in quotes, or a list of texts");
     insta::assert_snapshot!(window(""), @r#"c.toml:7:1: error: the window has neither begin nor end; add `days`, `except`, `hours`, `from` or `to`; `days = "every day"` for all times"#);
     insta::assert_snapshot!(window("from = \"2026-12-01T10:00\"\nto = \"2026-12-01T09:00\""), @"c.toml:10:6: error: the window is empty; `to` must be later than `from`");
-    insta::assert_snapshot!(window("value = 3\nhours = \"8 to 9\""), @"c.toml:9:9: error: [[window]] has no `value`; leave it out");
+    insta::assert_snapshot!(window("value = 3\nhours = \"8 to 9\""), @"c.toml:9:9: error: `value` is not a key of [[window]]; leave it out");
     insta::assert_snapshot!(window("hour = \"8 to 9\""), @"c.toml:9:1: error: unknown key `hour`; did you mean `hours`?");
 }
 
@@ -87,7 +87,7 @@ fn calendars_without_measure_are_refused() {
     let many =
         "[[window]]\nfact = \"(open bakery)\"\nhours = [\"8 to 9\", \"10 to 11\", \"12 to 13\"]\n";
     let text = HEAD.replace("3 days", "36000 days") + &many.repeat(3);
-    insta::assert_snapshot!(read_with(&text, None).expect_err("a mistake"), @"c.toml:10:1: error: the calendar has more than 200000 windows; choose a nearer `horizon`, or name fewer objects");
+    insta::assert_snapshot!(read_with(&text, None).expect_err("a mistake"), @"c.toml:10:1: error: the calendar has more than 200000 windows (counted up to here); choose a nearer `horizon`, or name fewer objects");
     assert!(long("9000 days").is_ok());
 }
 
@@ -98,7 +98,7 @@ fn unknown_facts_are_refused() {
     insta::assert_snapshot!(fact("\"(open bakrey)\""), @"c.toml:8:8: error: the problem has no object `bakrey`; did you mean `bakery`?");
     insta::assert_snapshot!(fact("\"(open ann)\""), @"c.toml:8:8: error: the type of `ann` does not match that of `?shop`; give an object of type shop");
     insta::assert_snapshot!(fact("\"(open)\""), @"c.toml:8:8: error: `open` takes 1 arguments, but 0 are given; `_` means any object");
-    insta::assert_snapshot!(fact("\"open\""), @"c.toml:8:8: error: `open` names no fact; write it like `(open bakery)` or `(open _)`");
+    insta::assert_snapshot!(fact("\"open\""), @"c.toml:8:8: error: `open` is not the name of a fact; write it like `(open bakery)` or `(open _)`");
     insta::assert_snapshot!(fact("\"(busy)\""), @"c.toml:8:8: error: `busy` is derived from other facts; give windows for those facts");
     insta::assert_snapshot!(fact("\"(free ann)\""), @"c.toml:8:8: error: the problem itself sets (free ann) at the beginning; remove it from the problem's `:init`, or from the calendar");
     insta::assert_snapshot!(fact("\"(open _)\""), @"c.toml:8:8: error: the problem itself sets (open bank) with a timed initial; remove it from the problem's `:init`, or from the calendar");
@@ -114,7 +114,7 @@ fn mistakes_in_values_are_refused() {
     insta::assert_snapshot!(value("(rate bank)", "value = \"high\""), @"c.toml:9:9: error: expected a number");
     insta::assert_snapshot!(value("(price)", "value = 2"), @"c.toml:8:10: error: the problem itself sets (price) at the beginning; remove it from the problem's `:init`, or from the calendar");
     let twice = "value = 2\n[[value]]\nfluent = \"(rate _)\"\nvalue = 3";
-    insta::assert_snapshot!(value("(rate bank)", twice), @"c.toml:11:10: error: (rate bank) already has a value for all other times; its first [[value]] has no `days`, `hours`, `from` and `to`, and the others have some");
+    insta::assert_snapshot!(value("(rate bank)", twice), @"c.toml:11:10: error: (rate bank) already has a value for all other times; the first [[value]] of a fluent must have none of `days`, `hours`, `from` and `to`; the others must have at least one");
 }
 
 #[test]

@@ -232,7 +232,7 @@ impl Client<'_> {
         } else {
             let until = taken.until.as_deref().unwrap_or("possible");
             format!(
-                "{name}accepted, takes effect as soon as {}\n",
+                "{name}pending: it is processed as soon as {}\n",
                 escape_control(until)
             )
         })?;

@@ -59,7 +59,7 @@ fn only_ends_with_a_reason_are_at_their_limits() {
             "{far}"
         );
         assert!(
-            far.contains("Where no reason is given, an end could still move."),
+            far.contains("Bounds without a reason could move further."),
             "{far}"
         );
     }

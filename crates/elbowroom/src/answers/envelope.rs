@@ -350,7 +350,7 @@ impl Subject<'_> {
         Err(PipelineError::Refused(Refusal::Nature {
             place: place.to_owned(),
             obstacle: format!(
-                "processes and events may occur in a different order, and that case is not \
+                "processes and events may behave differently, and that case is not \
                  analysed: {reason}"
             ),
         }))

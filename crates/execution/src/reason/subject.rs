@@ -161,7 +161,7 @@ impl fmt::Display for Subject {
                 let why = why.as_deref().unwrap_or("it was cancelled");
                 return write!(
                     f,
-                    "{why}; {failures} failures in a row, although each start succeeds with \
+                    "{why}; {failures} failures in a row, although it succeeds with \
                      probability {success}"
                 );
             }

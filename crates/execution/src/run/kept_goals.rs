@@ -120,7 +120,9 @@ impl Run<'_> {
         };
         let (now, belief) = (&self.now, &self.belief);
         let is_watched = |goal: &mut OpenGoal| goal.is_watched(now);
-        let opened: Vec<OpenGoal> = lasting.queued.extract_if(.., is_watched).collect();
+        let mut opened: Vec<OpenGoal> = lasting.queued.extract_if(.., is_watched).collect();
+        // Of goals with equal values that exclude each other, the first one is selected.
+        opened.sort_by_key(|goal| !goal.holds(belief));
         let violated = opened.iter().filter(|goal| !goal.holds(belief));
         let names: Vec<String> = violated.map(|goal| format!("`{}`", goal.name)).collect();
         for goal in &opened {

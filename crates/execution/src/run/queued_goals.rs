@@ -47,17 +47,18 @@ impl Run<'_> {
 
     /// Abandons the goal of this name.
     pub(super) fn abandon_goal(&mut self, name: &str) -> Remark {
-        self.retry_conflicting_goals();
         let Some(lasting) = &mut self.goal_manager else {
             return None;
         };
         let is_it = |known: &mut OpenGoal| known.name == name;
         if lasting.queued.extract_if(.., is_it).count() > 0 {
+            self.retry_conflicting_goals();
             return None;
         }
         if lasting.goals.extract_if(.., is_it).count() == 0 {
             return Some("there is no open goal with this name");
         }
+        self.retry_conflicting_goals();
         self.pursue_all();
         self.record_goal_change(format!("`{name}` is abandoned"), false);
         None

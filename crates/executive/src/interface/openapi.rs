@@ -198,7 +198,7 @@ pub fn openapi() -> Value {
         });
         if method.changes() {
             operation["responses"]["202"] = json!({
-                "description": "Received, but not processed yet, because planning is in progress",
+                "description": "Received, but not processed yet, because the executive plans or waits for the world",
                 "content": content,
             });
             operation["security"] = json!([{ "token": [] }]);

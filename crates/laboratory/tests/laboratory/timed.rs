@@ -329,7 +329,7 @@ fn a_goal_that_a_timed_initial_changes_is_refused() {
     let found = optimum(&task, &model, &Settings::default(), &|| true);
     assert_eq!(
         found.expect_err("it is refused").what,
-        "a timed initial changes a fact of the goal, so the goal is not yet reached when it holds"
+        "a timed initial changes a fact or number of the goal, so the goal is not yet reached when it holds"
     );
 }
 

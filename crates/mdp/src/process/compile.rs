@@ -409,7 +409,7 @@ impl<'t> Compiler<'t> {
         for timed in self.task.timed() {
             if Footprint::of_timed(timed).writes_reads_of(&goal) {
                 return Err(NotTabulated::new(
-                    "a timed initial changes a fact of the goal, so the goal is not yet reached \
+                    "a timed initial changes a fact or number of the goal, so the goal is not yet reached \
                      when it holds",
                 ));
             }

@@ -9,7 +9,7 @@ async function request(method, path) {
   const body = await answer?.json().catch(() => null);
   let words = "the executive does not answer";
   if (body?.error) words = `${body.error}: ${body.help}`;
-  else if (body) words = (body.name ? `${body.name}: ` : "") + (body.taken ? "done" : `accepted, takes effect as soon as ${body.until ?? "possible"}`);
+  else if (body) words = (body.name ? `${body.name}: ` : "") + (body.taken ? "done" : `pending: it is processed as soon as ${body.until ?? "possible"}`);
   byId("reply").textContent = words;
   return answer?.status ?? 0;
 }

@@ -88,7 +88,7 @@ test("it says how far a slider can go, and beyond that the command says that the
   await slider.focus();
   await slider.press("ArrowRight");
   await tab.waitForFunction(() => document.getElementById("limits").textContent.includes("first violation beyond"));
-  const limit = Number(/Up to ([\d.]+): works; beyond/.exec(await tab.locator("#limits").textContent())[1]);
+  const limit = Number(/Up to ([\d.]+): works; the first violation beyond/.exec(await tab.locator("#limits").textContent())[1]);
   const step = Number(await slider.getAttribute("step"));
   for (const [value, works] of [[limit, true], [limit + step, false]]) {
     await slider.evaluate((it, to) => { it.value = to; it.dispatchEvent(new Event("input")); }, value);

@@ -41,8 +41,8 @@ POLL_INTERVAL = 0.1
 """Longest time until a signal is noticed, in seconds."""
 
 
-_worlds_in_use: set[int] = set()
-"""Identities of the worlds of current runs."""
+_worlds_in_use: list[object] = []
+"""The worlds of current runs."""
 
 _worlds_lock = threading.Lock()
 
@@ -212,7 +212,7 @@ class Lifecycle:
         action = self._actions.get(ticket)
         if action is None or self._is_refused:
             # The world did not receive this start.
-            why = "the world failed before it was started"
+            why = "another run uses this world" if self._is_refused else "the world failed before it was started"
             self._unstarted.append(ended(ticket, Fraction(now), "cancelled", why))
         elif ticket not in self._cancelled:
             self._cancelled.add(ticket)
@@ -275,9 +275,17 @@ class Lifecycle:
         begun = time.monotonic()
         self._is_closing = True
         self._ends_since = begun if since is None else since
-        if self._is_refused:
+        if self._is_refused or not self._has_claimed():
             self._submit.close()
             return None
+        try:
+            return self._stop_world(since, begun)
+        finally:
+            self._submit.close()
+            with _worlds_lock:
+                _worlds_in_use[:] = [it for it in _worlds_in_use if it is not self._owner]
+
+    def _stop_world(self, since: float | None, begun: float) -> Exception | None:
         for ticket in [*self._open]:
             self.cancel(self._now, ticket)
         stop = getattr(self._world, "stop", None)
@@ -290,10 +298,6 @@ class Lifecycle:
                     self._failure = self._failure or error
         for future in self._unfinished:
             future.cancel()
-        self._submit.close()
-        if self.is_begun:
-            with _worlds_lock:
-                _worlds_in_use.discard(id(self._owner))
         return self._failure
 
     @property
@@ -304,26 +308,27 @@ class Lifecycle:
     # Helpers.
 
     def _begin(self, method: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        if not self.is_begun:
-            self._claim_world()
-            self.is_begun = True
+        if not self._has_claimed():
+            self.begin_end()
+            raise RequestError(
+                "another run uses this world: the two would take each other's observations; "
+                "give each run a world of its own, or wait for the end of the other run"
+            )
         future = self._submit(method, *arguments)
         future.add_done_callback(lambda _: self._inbox.put(None))
         self._unfinished = [it for it in self._unfinished if not it.done()]
         self._unfinished.append(future)
         return future
 
-    def _claim_world(self) -> None:
-        with _worlds_lock:
-            self._is_refused |= id(self._owner) in _worlds_in_use
-            if not self._is_refused:
-                _worlds_in_use.add(id(self._owner))
-                return
-        self.begin_end()
-        raise RequestError(
-            "another run uses this world: the two would take each other's observations; "
-            "give each run a world of its own, or wait for the end of the other run"
-        )
+    def _has_claimed(self) -> bool:
+        """Claims the world at the first call. Returns ``False`` if another run uses it."""
+        if not self.is_begun and not self._is_refused:
+            with _worlds_lock:
+                self._is_refused = any(it is self._owner for it in _worlds_in_use)
+                if not self._is_refused:
+                    _worlds_in_use.append(self._owner)
+                    self.is_begun = True
+        return self.is_begun
 
     def _call(self, method: Callable[..., Any], *arguments: Any) -> Any:
         """Returns the answer of a method, or ``None`` if the run is to end and the method still runs."""

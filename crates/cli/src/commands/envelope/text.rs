@@ -219,6 +219,7 @@ fn headline(balance: &UniformSlack, parameters: &[LimitedRange]) -> String {
         match &deviation.limit {
             // All quantities may have their least values.
             _ if sign == "-" && deviation.share >= Rational::ONE => "-100 %".to_owned(),
+            _ if percent == "0" || percent == "0.0" => "0 %".to_owned(),
             None if !deviation.share.is_zero() => format!("beyond {sign}{percent} %"),
             _ => format!("{sign}{percent} %"),
         }

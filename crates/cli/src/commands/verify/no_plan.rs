@@ -27,7 +27,7 @@ pub(super) fn run(arguments: &VerifyArgs, source: &Source, output: &mut Output) 
     let certificate = certificate_of(source.text()).map_err(|error| {
         let advice = match error {
             NoPlanAnswerError::NotDenied => {
-                "this answer contains a plan, which `elbowroom check` validates"
+                "this answer does not claim that no plan exists; `elbowroom check` validates a plan"
             }
             NoPlanAnswerError::Uncertified(_) => {
                 "docs/formats/no-plan.md lists the proofs with certificates"

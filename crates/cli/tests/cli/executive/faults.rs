@@ -160,7 +160,7 @@ fn ctl_events_reports_reason_of_rejection() {
     ] {
         assert!(said.contains(words), "{said}");
     }
-    assert!(!said.contains("no executive"), "{said}");
+    assert!(!said.contains("is not an executive"), "{said}");
 }
 
 #[test]

@@ -95,8 +95,8 @@ impl Network {
 
     /// Returns the GUID of the participant, which is unique in the domain, as hexadecimal digits.
     pub(super) fn id(&self) -> String {
-        let bytes = self.participant.guid().to_bytes();
-        bytes.iter().map(|it| format!("{it:02x}")).collect()
+        let guid = u128::from_be_bytes(self.participant.guid().to_bytes());
+        format!("{guid:032x}")
     }
 
     /// Creates the topic of that name in the namespace. `kind` is its type, as in

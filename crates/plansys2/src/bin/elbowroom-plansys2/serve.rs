@@ -139,14 +139,17 @@ impl Server {
                 .and_then(|it| it.world.due_in(self.now()));
             // The only possible error is a time-out, because the sender is kept.
             let input = received.recv_timeout(due.map_or(TICK, |it| it.min(TICK)));
-            if let Ok(Input::Claim(text)) = &input {
-                refusal = refusal.and(self.topics.check_claim(text, self.now()));
+            if let (Ok(Input::Claim(text)), None) = (&input, leaves) {
+                refusal = self.topics.check_claim(text, self.now());
             }
-            if refusal.is_err() || matches!(input, Ok(Input::Stop)) {
-                leaves.get_or_insert(self.now());
-                self.interrupt();
-            } else if let Ok(input) = input {
-                self.handle_input(input);
+            match input {
+                Ok(Input::Claim(_)) if refusal.is_ok() || leaves.is_some() => {}
+                Ok(Input::Claim(_) | Input::Stop) => {
+                    leaves.get_or_insert(self.now());
+                    self.interrupt();
+                }
+                Ok(input) => self.handle_input(input),
+                Err(_) => {}
             }
             self.hub.tick(self.now());
             warn_on_error(self.services.flush());
@@ -155,6 +158,7 @@ impl Server {
             if patience.is_some_and(|is_over| is_over || self.execution.is_none()) {
                 // Cancel messages are delivered and planners killed before the program ends.
                 self.is_over.store(true, Ordering::Relaxed);
+                self.topics.release_claim();
                 thread::sleep(TICK);
                 return refusal;
             }

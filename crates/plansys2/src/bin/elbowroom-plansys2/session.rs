@@ -196,6 +196,7 @@ impl Session {
 
     /// Cancels running actions, after the end of the run or the loss of Elbowroom.
     fn shut_down(mut self) {
+        self.topics.release_claim();
         for ticket in self.world.running() {
             self.hub.cancel(ticket);
         }

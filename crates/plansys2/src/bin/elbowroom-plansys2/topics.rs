@@ -47,6 +47,15 @@ impl Topics {
         }
     }
 
+    /// Releases the claim: another executor may use the performers once the messages of this one
+    /// are sent.
+    pub(super) fn release_claim(&mut self) {
+        if let Some(it) = &mut self.claim {
+            it.claim.release();
+        }
+        self.publish_claim(Duration::MAX);
+    }
+
     /// Publishes the claim if its text has changed. To be called a few times a second.
     pub(super) fn publish_claim(&mut self, now: Duration) {
         let Some(it) = &mut self.claim else { return };

@@ -1,7 +1,11 @@
 //! Goals to keep.
 
+use std::sync::Arc;
+
 use elbowroom::execution::GoalTerms;
+use elbowroom::model::Task;
 use elbowroom::num::Rational;
+use elbowroom::pddl::{Source, read_problem};
 
 use super::scripted::{abandon, assert_has, fact, has, keep, pursue, pursue_on, run, task};
 
@@ -141,6 +145,37 @@ fn goals_to_keep_that_exclude_each_other_are_not_achieved_alternately() {
         "{:#?}",
         told.notes
     );
+}
+
+/// Each of the two goals to keep can be achieved at any time, and makes the other one false.
+#[test]
+fn kept_goal_that_holds_is_preferred_whenever_other_goals_are_added() {
+    const ROOMS: &str = "(define (domain rooms) (:requirements :durative-actions :typing)
+        (:types place item) (:predicates (at ?p - place) (free) (have ?x - item))
+        (:durative-action go :parameters (?from ?to - place) :duration (= ?duration 10)
+          :condition (and (at start (at ?from)) (at start (free)))
+          :effect (and (at start (not (free))) (at start (not (at ?from)))
+                       (at end (free)) (at end (at ?to))))
+        (:durative-action fetch :parameters (?x - item) :duration (= ?duration 10)
+          :condition (at start (free))
+          :effect (and (at start (not (free))) (at end (free)) (at end (have ?x)))))";
+    const PROBLEM: &str =
+        "(define (problem p) (:domain rooms) (:objects a b - place book cup key - item)
+        (:init (at a) (free)) (:goal (have book)))";
+    let read = read_problem(&Source::new("d", ROOMS), &Source::new("p", PROBLEM));
+    let task = Arc::new(Task::new(read.expect("a correct problem").0));
+    let script = vec![
+        (20, keep("a", "(at a)")),
+        (20, keep("b", "(at b)")),
+        (60, pursue("cup", "(have cup)")),
+        (100, pursue("key", "(have key)")),
+    ];
+    let told = run(&task, 200, script);
+    assert_has(
+        &told,
+        &["`b` queued", "start (fetch cup)", "start (fetch key)"],
+    );
+    assert!(!has(&told, "start (go"), "{:#?}", told.notes);
 }
 
 #[test]
