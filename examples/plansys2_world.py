@@ -2,10 +2,10 @@
 """A world for `elbowroom run … --world-process "python3 plansys2_world.py"`: the action performers of PlanSys2.
 
 Put `clients/python/elbowroom_world.py` beside this file, and start it where ROS 2 and your `plansys2_msgs` are set up.
-PlanSys2's own executor must be off: two of them would both answer. A second world of Elbowroom refuses to start;
-`--shared` allows it. docs/plansys2.md says more.
+PlanSys2's own executor must be off, because two executors would both answer. A second world of Elbowroom does not start
+unless `--shared` is given. docs/plansys2.md has the details.
 
-`Hub` is the conversation of PlanSys2's topic `actions_hub`, without ROS, so that it can be tested anywhere; `main`
+`Hub` implements the protocol on PlanSys2's topic `actions_hub` without ROS, so that it can be tested anywhere. `main`
 connects it with rclpy.
 """
 
@@ -25,17 +25,19 @@ REQUEST, RESPONSE, CONFIRM, REJECT, FEEDBACK, FINISH, CANCEL = range(1, 8)
 NOT_READY, READY, RUNNING, FAILURE = 0, 1, 2, 4
 
 ASK_EVERY = 1.0
-"""A request may be lost while nodes find each other; it is repeated after so many seconds."""
+"""Interval at which unanswered requests are repeated, in seconds. Requests may be lost while nodes discover each
+other."""
 GIVE_UP_ASKING = 30.0
 LOST_AFTER = 5.0
-"""A performer whose status came every second, and has not come for so long, is lost."""
+"""Time without a status message after which a performer counts as lost, in seconds. Each performer sends one per
+second."""
 IDLE_AFTER = 3.0
-"""A performer that has said for so long that it does nothing is not going to say how its action ended: either it
-was never told to begin, or its last word is lost."""
+"""Time for which a performer reports that it is idle before its action counts as failed, in seconds. Such a performer
+has not received the order to begin, or its last message was lost."""
 
 
 class Deal:
-    """One action, and the performer that does it."""
+    """An action and the performer that executes it."""
 
     def __init__(self, action, now):
         self.action, self.key = action, (action.name, tuple(action.arguments))
@@ -56,8 +58,8 @@ class Hub:
         self._lock = threading.RLock()
 
     def begin(self, action):
-        """Looks for a performer. Messages carry no number of the execution, so that a second one of the
-        same action could not be told from the first."""
+        """Searches for a performer. Messages do not identify the execution, so the same action cannot be
+        executed twice at the same time: the second execution fails."""
         with self._lock:
             deal = Deal(action, self._clock())
             there = self._deals.get(deal.key)
@@ -70,7 +72,8 @@ class Hub:
                 action.failed(f"{there.performer} has not confirmed that it has stopped the same action")
 
     def cancel(self, action):
-        """Has the performer stop. It does not answer: that it is ready again shows that it has."""
+        """Sends a cancellation to the performer. PlanSys2 has no answer to it: the action counts as stopped when the
+        performer's status is no longer RUNNING."""
         with self._lock:
             deal = self._deals.get((action.name, tuple(action.arguments)))
             if deal is None or deal.action is not action or deal.cancelled is not None:
@@ -83,7 +86,7 @@ class Hub:
             self._tell(CANCEL, deal, deal.performer)
 
     def message(self, message):
-        """Takes what came on `actions_hub`, its own messages included."""
+        """Processes a message on `actions_hub`. The hub also receives its own messages."""
         arguments = tuple(it.lower() for it in message.arguments)
         name = message.action.lower()
         if arguments == (name,):
@@ -116,7 +119,7 @@ class Hub:
                     deal.action.succeeded()
 
     def status(self, status):
-        """Takes what came on `performers_status`."""
+        """Processes a message on `performers_status`."""
         with self._lock:
             now = self._clock()
             self._heard[status.node_name] = now, getattr(status, "action", "")
@@ -137,14 +140,14 @@ class Hub:
                         self._lose(deal, f"{deal.performer} is idle, and has not reported the outcome")
 
     def performers(self):
-        """Those that were heard of lately, each with the action that it performs: `robot1 (move)`."""
+        """Returns the performers that have sent a status recently, each with its action: `robot1 (move)`."""
         with self._lock:
             now = self._clock()
             lately = sorted((name, action) for name, (at, action) in self._heard.items() if now - at <= LOST_AFTER)
             return [f"{name} ({action})" if action else name for name, action in lately]
 
     def tick(self):
-        """Asks again, and notices who is lost. To be called a few times a second."""
+        """Repeats unanswered requests and detects lost performers. Call it a few times per second."""
         with self._lock:
             now = self._clock()
             for deal in list(self._deals.values()):
@@ -173,7 +176,8 @@ class Hub:
 
 
 class Claim:
-    """The claim to the performers, on the topic `elbowroom/claims`. `crates/plansys2/src/claim.rs` has the rules."""
+    """This executor's claim to the performers, on the topic `elbowroom/claims`. `crates/plansys2/src/claim.rs` has the
+    rules."""
 
     STATES = ("waiting", "new", "established")
     PROBATION = 5.0
@@ -201,7 +205,7 @@ class Claim:
             self._publish(f"{self.STATES[state]} {self.id} {self._name}")
 
     def check(self, text):
-        """Takes the claim of an executor, and sets `refusal` if it has priority."""
+        """Processes the claim of an executor. Sets `refusal` if that claim has priority."""
         state, _, rest = text.partition(" ")
         other_id, _, name = rest.partition(" ")
         own = self._state()
@@ -263,7 +267,7 @@ def main():
         world.run()
         # Cancellations need time to reach the performers.
         time.sleep(0.2)
-    # In this order: Python must not end while a thread of ROS still runs.
+    # Stop the thread of ROS first: Python must not end while it is running.
     executor.shutdown()
     rclpy.try_shutdown()
     spinning.join(timeout=5)

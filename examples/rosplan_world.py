@@ -2,11 +2,11 @@
 """A world for `elbowroom run … --world-process "python3 rosplan_world.py domain.pddl"`: the action interfaces of
 ROSPlan (ROS 1), in place of its plan dispatcher, which must be off.
 
-Put `clients/python/elbowroom_world.py` beside this file, and start it where ROS and `rosplan_dispatch_msgs` are set up. The
-domain says what the parameters of each action are called: ROSPlan wants their names. Its action interfaces have no agreed
-way to be cancelled, so this world does not claim to cancel anything.
+Put `clients/python/elbowroom_world.py` beside this file, and start it where ROS and `rosplan_dispatch_msgs` are set
+up. The domain file gives the names of each action's parameters, which ROSPlan's messages contain. ROSPlan has no
+standard way to cancel actions, so this world declares that it cannot cancel.
 
-`Dispatcher` is the conversation without ROS, so that it can be tested anywhere; `main` connects it with rospy.
+`Dispatcher` implements the protocol without ROS, so that it can be tested anywhere. `main` connects it with rospy.
 """
 
 import os
@@ -26,14 +26,15 @@ MEANINGS = {
 
 
 def parameters(domain):
-    """The names of each action's parameters: `{"move": ["r", "from", "to"]}`."""
+    """Returns the names of each action's parameters: `{"move": ["r", "from", "to"]}`."""
     text = re.sub(r";[^\n]*", "", domain).lower()
     found = re.findall(r"\(\s*:(?:durative-)?action\s+([^\s()]+)\s+:parameters\s*\(([^()]*)\)", text)
     return {name: re.findall(r"\?([^\s()]+)", listed) for name, listed in found}
 
 
 def kind(status, constants):
-    """What a status means. Older versions have texts, newer ones numbers, some of which have several names."""
+    """Returns the meaning of a status, or None if it is unknown. Older versions of ROSPlan have texts, newer ones
+    numbers. Some numbers have several names."""
     names = [name for name, number in constants.items() if number == status] or [str(status)]
     words = " ".join(names).lower().replace("_", " ")
     for meaning, signs in MEANINGS.items():
@@ -43,10 +44,10 @@ def kind(status, constants):
 
 
 class Dispatcher:
-    """Dispatches actions, and takes the feedback. `publish(id, name, pairs, duration)` dispatches.
+    """Dispatches actions and processes their feedback. `publish(id, name, pairs, duration)` sends a dispatch message.
 
-    Action interfaces repeat their last word to whoever comes later, also that about an earlier run: so the numbers of
-    each run begin elsewhere, with `first`.
+    Action interfaces repeat their last message to later subscribers, even if it is about an earlier run. So the action
+    numbers of each run begin with a different number, `first`.
     """
 
     def __init__(self, publish, names, constants=None, first=0):
@@ -82,7 +83,8 @@ class Dispatcher:
 
 
 def wait_for_interfaces(connected):
-    """Nothing is dispatched twice, so that all who are up must have been found: for a second nobody new has come."""
+    """Waits until action interfaces are connected and no new one has appeared for a second. No action is dispatched
+    twice, so all running interfaces must be connected before the first dispatch."""
     begun = changed = time.monotonic()
     within = float(os.environ.get("ELBOWROOM_PERFORMERS_WITHIN", "10"))
     known = connected()
@@ -95,7 +97,7 @@ def wait_for_interfaces(connected):
 
 
 def running_node(name):
-    """The process of the node of this name, or None. The master also lists nodes that have crashed."""
+    """Returns the process ID of the running node of this name, or None. The master also lists nodes that have crashed."""
     from xmlrpc.client import ServerProxy
 
     import rosgraph
@@ -133,7 +135,8 @@ def main():
         for word, value in vars(ActionFeedback).items()
         if word.isupper() and isinstance(value, int)
     }
-    # ROSPlan's action interfaces cannot handle more than 1000 starts per second.
+    # Each second has its own range of 1000 numbers. A run that starts fewer than 1000 actions per second on average never
+    # uses numbers of a later run.
     dispatcher = Dispatcher(publish, names, constants, first=int(time.time()) % 1_000_000 * 1000)
     subscriber = rospy.Subscriber(TOPICS[1], ActionFeedback, dispatcher.feedback)
     wait_for_interfaces(lambda: (publisher.get_num_connections(), subscriber.get_num_connections()))

@@ -1,4 +1,4 @@
-"""What `plansys2_world.py` makes of performers, good and bad. `python3 -m unittest discover -s examples`"""
+"""Tests of `plansys2_world.py` with correct and faulty performers: `python3 -m unittest discover -s examples`"""
 
 import unittest
 from types import SimpleNamespace
@@ -9,7 +9,7 @@ from plansys2_world import (
 
 
 class Asked:
-    """An action that Elbowroom has started, and what it is told about it."""
+    """An action that Elbowroom has started, and the reports about it."""
 
     def __init__(self, name="move", arguments=("r", "a", "b"), duration=5.0):
         self.name, self.arguments, self.duration = name, list(arguments), duration
@@ -50,7 +50,7 @@ class Performers(unittest.TestCase):
         self.hub.status(SimpleNamespace(node_name=node, state=state))
 
     def after(self, seconds, alive=None):
-        """Time passes, with a heartbeat each second."""
+        """Advances the clock, with a status message each second."""
         for _ in range(int(seconds * 5)):
             self.now += 0.2
             if alive is not None and round(self.now * 5) % 5 == 0:

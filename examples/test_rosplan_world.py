@@ -1,4 +1,4 @@
-"""What `rosplan_world.py` makes of action interfaces. `python3 -m unittest discover -s examples`"""
+"""Tests of `rosplan_world.py` with fake action interfaces: `python3 -m unittest discover -s examples`"""
 
 import unittest
 from types import SimpleNamespace

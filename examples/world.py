@@ -1,27 +1,27 @@
 #!/usr/bin/env python3
-"""A world for `elbowroom run --world-process "python3 examples/world.py"`: everything takes 10 %
+"""A world for `elbowroom run --world-process "python3 examples/world.py"`: each action takes 10 %
 longer than planned. docs/formats/world-protocol.md describes the messages."""
 import json
 import sys
 
-now, ends, news = 0.0, {}, []  # the time, when each running action ends, and what to report
+now, ends, news = 0.0, {}, []  # the time, the end times of running actions, and unsent reports
 
 def report(**message):
     news.append(dict(message, time=now))
 
 def start(ticket, action, duration):
     report(type="started", ticket=ticket)
-    if duration is not None:  # an instantaneous action is over when it has started
+    if duration is not None:  # an instantaneous action ends with its start
         ends[ticket] = now + 1.1 * duration["decimal"]
 
 def cancel(ticket):
     if ends.pop(ticket, None) is not None:
         report(type="ended", ticket=ticket, outcome="cancelled")
 
-def wait(until):  # until something happens, but not beyond `until`
+def wait(until):  # until the next event, at most until the time `until`
     global now
     ticket = min(ends, key=ends.get, default=None)
-    if news:  # what a command led to is reported at once
+    if news:  # the results of commands are reported at once
         return
     if ticket is not None and ends[ticket] <= until:
         now = max(now, ends.pop(ticket))

@@ -22,7 +22,7 @@ if (!file) {
   file = join(process.env.CARGO_TARGET_DIR ?? join(root, "target"), "wasm32-unknown-unknown/web/elbowroom_web.wasm");
 }
 const plain = readFileSync(file);
-// Browsers unpack gzip by themselves; Zopfli finds a shorter text of it.
+// Browsers decompress gzip natively; Zopfli compresses better in the same format.
 const module = await gzipAsync(plain, { numiterations: 15, blocksplittingmax: 0 });
 
 // The examples are the cases that the library is tested with.
@@ -60,7 +60,7 @@ const parts = {
   "{script}": script,
   "{module}": Buffer.from(module).toString("base64"),
 };
-// What is put in is not searched: it may have anything in it.
+// Inserted texts are not searched for placeholders, because they may contain any text.
 const page = readFileSync(join(source, "index.html"), "utf8").split(/(\{style\}|\{script\}|\{module\})/).map((part) => parts[part] ?? part).join("");
 mkdirSync(join(here, "dist"), { recursive: true });
 writeFileSync(join(here, "dist", "index.html"), page);

@@ -8,13 +8,13 @@ const escaped = (text) => text.replaceAll("&", "&amp;").replaceAll("<", "&lt;").
 const ASKS = ["check", "plan", "envelope", "run"];
 // Options that only concern files of the command line.
 const FILES = { "--trace": 1, "-o": 1, "--plan": 1 };
-// Options for which there is something else here.
+// Options that the playground replaces by its own controls.
 const ELSEWHERE = ["--planner", "--world-process", "--replay", "--json"];
 
 const words = (line) => [...line.matchAll(/"([^"]*)"|(\S+)/g)].map((match) => match[1] ?? match[2]);
 const quoted = (word) => (/\s/.test(word) ? `"${word}"` : word);
 
-// A command as something to try; null if the playground cannot.
+// Converts a command to input for the playground; null if the playground does not support it.
 function trial(line, state) {
   const [program, ask, ...rest] = words(line);
   if (program !== "elbowroom" || !ASKS.includes(ask)) return null;
@@ -46,14 +46,14 @@ export function chapters(root) {
     const trials = [];
     const marked = new Marked({
       renderer: {
-        // There is nothing to go to from a page that stands by itself.
+        // A self-contained page has no link targets outside.
         link({ tokens }) { return this.parser.parseInline(tokens); },
-        // The playground shows the real thing.
+        // The playground shows the answer itself instead of a picture of it.
         image() { return ""; },
         code({ text, lang }) {
           const [, format] = /^format = "elbowroom-(world|likelihoods)"/.exec(text) ?? [];
           if (format) state[format] = `${text}\n`;
-          // Lines that documentation tests need, and nobody reads.
+          // Hidden lines of documentation tests.
           const shown = lang === "rust" ? text.split("\n").filter((line) => !/^# |^#$/.test(line)).join("\n") : text;
           const commands = lang === "text" ? text.replaceAll("\\\n", " ").split("\n").filter((line) => line.startsWith("elbowroom ")) : [];
           const buttons = commands.flatMap((line) => {
@@ -69,7 +69,7 @@ export function chapters(root) {
     });
     const text = readFileSync(file, "utf8");
     const [, title] = /^# (.*)$/m.exec(text);
-    // The title is in the list of chapters, and the page has one of its own.
+    // The title is removed, because the list of chapters contains it and the page has its own title.
     const html = marked.parse(text.replace(/^# .*$/m, "")).replaceAll(/<(\/?)h2/g, "<$1h3");
     return { title, html, trials };
   });

@@ -64,30 +64,30 @@ class Failed(Exception):
 
 
 class Action:
-    """An action that is to be done."""
+    """An action to execute."""
 
     def __init__(self, world: World, ticket: int, name: str, duration: float | None) -> None:
         self.ticket = ticket
-        """The number of the start, which never comes again within a run."""
+        """The number of the start, unique within a run."""
         self.text = name
-        """As the plan has it: ``(drive rover depot shelf)``."""
+        """The ground action: ``(drive rover depot shelf)``."""
         words = name.strip("() ").split()
         self.name = words[0] if words else ""
-        """``drive``."""
+        """The name: ``drive``."""
         self.arguments = words[1:]
-        """``["rover", "depot", "shelf"]``."""
+        """The arguments: ``["rover", "depot", "shelf"]``."""
         self.duration = duration
-        """How long the plan has it take, in seconds; ``None`` for an instantaneous action."""
+        """The planned duration in seconds; ``None`` for an instantaneous action."""
         self.start: float | None = None
-        """When it started, by the world's clock."""
+        """The start time on the world's clock."""
         self.is_resumed = False
-        """Whether it was running before this program was started again."""
+        """``True`` if the action was running before this program was restarted."""
         self._world = world
         self._cancelled = threading.Event()
 
     @property
     def is_cancelled(self) -> bool:
-        """Whether it is to stop."""
+        """``True`` if the action must stop."""
         return self._cancelled.is_set()
 
     def sleep(self, seconds: float) -> bool:
@@ -95,25 +95,25 @@ class Action:
         return not self._cancelled.wait(max(0.0, seconds) / self._world.speed)
 
     def feedback(self, completion: float | None = None, note: str = "") -> None:
-        """Says how far it has come, from 0 to 1, and what there is to say about it."""
+        """Reports progress: the completion from 0 to 1, and a note for the trace."""
         part = None if completion is None else min(1.0, max(0.0, float(completion)))
         self._tell(type="feedback", completion=part, note=note)
 
     def started(self, measured: dict[str, float] | None = None, *, stamp: Stamp | None = None) -> None:
-        """It has started now, or when the ``stamp`` says (:meth:`World.clock`)."""
+        """Reports that the action has started: now, or at the time of the ``stamp`` (:meth:`World.clock`)."""
         self._tell(type="started", stamp=stamp, **({"measured": measured} if measured else {}))
 
     def succeeded(self, measured: dict[str, float] | None = None, *, stamp: Stamp | None = None) -> None:
-        """It has ended now, or when the ``stamp`` says, as the domain says. ``measured``: by how much it really
-        changed fluents."""
+        """Reports that the action has ended with the effects of the domain: now, or at the time of the ``stamp``.
+        ``measured``: the measured changes of fluents, in place of those of the domain."""
         self._end("succeeded", stamp=stamp, **({"measured": measured} if measured else {}))
 
     def failed(self, why: str, *, stamp: Stamp | None = None) -> None:
-        """It has ended now, or when the ``stamp`` says, without its effects."""
+        """Reports that the action has failed, without its end effects: now, or at the time of the ``stamp``."""
         self._end("failed", why=why, stamp=stamp)
 
     def was_cancelled(self) -> None:
-        """The action has stopped as requested."""
+        """Reports that the action has stopped after a cancellation."""
         self._end("cancelled")
 
     def _end(self, outcome: str, **more: Any) -> None:
@@ -129,16 +129,16 @@ class Action:
 
 Does = Callable[[Action], Any]
 Stamp = tuple[str, float]
-"""A time of another clock, such as that of a robot's arm: its name and its reading."""
+"""A time of another clock, such as that of a robot's arm: the clock's name and its reading."""
 
 
 class World:
-    """A world on the wall clock. ``speed`` is how many of its seconds pass in one real second.
+    """A world on the wall clock. ``speed`` is the number of the world's seconds in one real second.
 
-    With a ``ledger``, a file, it can be started again after a crash, its own or Elbowroom's: it
-    writes down each start before the action begins, and each end, and answers from that what
-    became of them (``elbowroom run --resume``). A ledger belongs to one program at a time: who is
-    started while the last one is still about waits for its end.
+    With a ``ledger``, a file, the world can be restarted after a crash of its program or of
+    Elbowroom: it records each start before the action begins, and each end, and reports these
+    outcomes after ``elbowroom run --resume``. Only one program at a time uses a ledger: a second
+    one waits until the first one has ended.
     """
 
     capabilities: Iterable[str] = ("cancel", "feedback", "facts")
@@ -163,7 +163,7 @@ class World:
         self._news: list[dict[str, Any]] = []
         self._out: TextIO | None = None
         self._version = 1
-        # Set if Elbowroom is gone.
+        # Set when Elbowroom has ended.
         self._is_alone = threading.Event()
         # Reading of the monotonic clock at the world's time 0. That is the first message after the
         # greeting, so that preparations take no time.
@@ -172,37 +172,37 @@ class World:
     # Registration of functions.
 
     def action(self, *names: str, resumes: bool = False) -> Callable[[Does], Does]:
-        """The function does these actions, each call in a thread of its own. ``resumes``: it can
-        also be called for one that was running before a restart (``action.is_resumed``)."""
+        """Registers a function that executes these actions, each call in a separate thread. ``resumes``: the function
+        can also continue an action that was running before a restart (``action.is_resumed``)."""
         return self._register(names, "blocking", resumes)
 
     def starter(self, *names: str, resumes: bool = False) -> Callable[[Does], Does]:
-        """The function starts these actions and returns at once; their ends are reported later."""
+        """Registers a function that starts these actions and returns at once; their ends are reported later."""
         return self._register(names, "starter", resumes)
 
     def canceller(self, function: Does) -> Does:
-        """The function asks an action of :meth:`starter` to stop, and returns at once."""
+        """Registers a function that requests an action of :meth:`starter` to stop, and returns at once."""
         self._canceller = function
         return function
 
     def look(self, function: Callable[[list[str]], Any]) -> Callable[[list[str]], Any]:
-        """The function says what is so: it gets the words of a fact or fluent, and returns whether
-        the fact is true, the fluent's value, or ``None`` where it cannot tell."""
+        """Registers a function that observes the world: it receives the words of a fact or fluent, and returns the
+        fact's truth value, the fluent's value, or ``None`` if it cannot observe it."""
         self._look = function
         return function
 
     def believed(
         self, function: Callable[[dict[str, bool], dict[str, float | None]], Any]
     ) -> Callable[[dict[str, bool], dict[str, float | None]], Any]:
-        """The function is told what Elbowroom believes: at first all facts that are true and all values,
-        later what has changed: ``{"(at rover shelf)": True}``, ``{"(charge rover)": 17.5}``. It must not
+        """Registers a function that receives the state that Elbowroom believes: first all true facts and all values,
+        later only the changes: ``{"(at rover shelf)": True}``, ``{"(charge rover)": 17.5}``. It must not
         block."""
         self._believed = function
         return function
 
     def resumed(self, function: Callable[[list[Action]], Any]) -> Callable[[list[Action]], Any]:
-        """The function is called once when a run goes on after a crash, with the actions that go on. It
-        reports what is otherwise than actions say, such as what a cancelled one left behind."""
+        """Registers a function that is called once when a run resumes after a crash, with the actions that continue.
+        It reports facts and values that differ from the effects of actions, such as those after a cancelled action."""
         self._resumed = function
         return function
 
@@ -222,32 +222,32 @@ class World:
     # Reports without a request, from any thread.
 
     def fact(self, name: str, becomes: bool, *, stamp: Stamp | None = None) -> None:
-        """A fact was seen to be so: ``world.fact("(open door)", False)``; now, or when the ``stamp`` says."""
+        """Reports an observed fact: ``world.fact("(open door)", False)``; now, or at the time of the ``stamp``."""
         report = {"type": "fact", "fact": name, "becomes": bool(becomes), "stamp": stamp}
         self._inbox.put(("report", report, self.now()))
 
     def value(self, fluent: str, value: float, *, stamp: Stamp | None = None) -> None:
-        """A value was seen: ``world.value("(charge rover)", 17.5)``; now, or when the ``stamp`` says."""
+        """Reports an observed value: ``world.value("(charge rover)", 17.5)``; now, or at the time of the ``stamp``."""
         report = {"type": "value", "fluent": fluent, "value": value, "stamp": stamp}
         self._inbox.put(("report", report, self.now()))
 
     def clock(self, name: str, reads: float, rate: float | None = None) -> None:
-        """Another clock shows this now: ``world.clock("arm", 1700000012.4)``. To be said now and then. From then on,
-        reports can say when something happened by that clock: ``world.fact("(open door)", True, stamp=("arm",
-        1700000012.9))``. ``rate`` is how many of its seconds pass in one of the world's; without it, that is measured
-        from one reading to the next. In version 1 of the protocol there is one clock, and what is reported happens now."""
+        """Reports the present reading of another clock: ``world.clock("arm", 1700000012.4)``. Call it regularly. After
+        that, reports can give times on that clock: ``world.fact("(open door)", True, stamp=("arm", 1700000012.9))``.
+        ``rate`` is the number of that clock's seconds in one of the world's; without it, the rate is measured between
+        readings. Version 1 of the protocol has one clock only, and reports have the present time."""
         report = {"type": "clock", "clock": name, "reads": float(reads)}
         report.update({} if rate is None else {"rate": float(rate)})
         self._inbox.put(("report", report, self.now()))
 
     def now(self) -> float:
-        """What time it is: seconds since the run began."""
+        """Returns the present time: seconds since the run began."""
         return 0.0 if self._zero is None else (_time.monotonic() - self._zero) * self.speed
 
-    # The conversation.
+    # Communication.
 
     def run(self, input: TextIO | None = None, output: TextIO | None = None) -> None:
-        """Talks to Elbowroom until it says ``stop``, or is gone. Only the calling thread speaks."""
+        """Communicates with Elbowroom until it sends ``stop`` or ends. Only the calling thread writes messages."""
         source, self._out = input or sys.stdin, output or sys.stdout
         if output is None:
             # Standard output carries the protocol, so the program's own output goes to standard
@@ -292,7 +292,7 @@ class World:
         self._inbox.put(("end",))
 
     def _next(self, question: dict[str, Any] | None) -> tuple[Any, ...]:
-        """The next event: a message, a report, or the end of the wait."""
+        """Returns the next event: a message, a report, or the end of the wait."""
         if question is None:
             return self._inbox.get()
         left = max(0.0, (_number(question.get("until")) or 0.0) - self.now()) / self.speed
@@ -323,7 +323,7 @@ class World:
             self._out.write(json.dumps(message) + "\n")
             self._out.flush()
         except (BrokenPipeError, ValueError):
-            # Elbowroom is gone. The reading thread detects that at the end of the input.
+            # Elbowroom has ended. The reading thread detects that at the end of the input.
             pass
 
     def _obey(self, what: Any, message: dict[str, Any]) -> None:
@@ -493,7 +493,7 @@ class World:
             self._news.append(report)
 
     def _remember(self, lines: list[dict[str, Any]]) -> None:
-        """What happened before this program was started again."""
+        """Restores the actions and reports from before the restart."""
         self._continue_time(lines)
         for line in lines:
             if "zero" in line:
@@ -533,7 +533,7 @@ class World:
             self._zero = _time.monotonic() - last / self.speed
 
     def _leave(self) -> None:
-        """The run is over, or Elbowroom is gone: what runs is to stop, unless it can be resumed."""
+        """Stops the running actions when the run is over or Elbowroom has ended, unless they can be resumed."""
         if self._ledger is None:
             for action in self._actions.values():
                 if action.ticket not in self._ended:
@@ -542,7 +542,7 @@ class World:
 
 
 class Simulation(World):
-    """A world in which time jumps from one thing to the next.
+    """A simulated world whose time jumps from event to event.
 
         world = Simulation()
 
@@ -559,15 +559,15 @@ class Simulation(World):
         self._coming: list[tuple[float, int, dict[str, Any]]] = []
 
     def lasts(self, *names: str) -> Callable[[Callable[[Action], float]], Callable[[Action], float]]:
-        """The function says how many seconds these actions take. It may ``raise Failed(why)``: then
-        the action does not start. What it says of an instantaneous action does not count."""
+        """Registers a function that returns the duration of these actions in seconds. It may ``raise Failed(why)``:
+        then the action does not start. Its result for an instantaneous action is ignored."""
         return self._register(names, "lasts", False)
 
     def now(self) -> float:
         return self._clock
 
     def fact_at(self, time: float, name: str, becomes: bool) -> None:
-        """A fact that becomes so at that time, by itself."""
+        """Schedules a spontaneous change of a fact at that time."""
         self._coming.append((time, -1, {"type": "fact", "fact": name, "becomes": becomes}))
 
     def _launch(self, found: tuple[str, Does], action: Action) -> None:
@@ -704,8 +704,8 @@ class _Ledger:
         self._lock: TextIO | None = None
 
     def claim(self, is_over: Callable[[], bool]) -> None:
-        """Waits until no other program has this ledger: what that began might go on until it ends. The
-        system gives it back when this program ends, however it does."""
+        """Waits until no other program uses this ledger, because actions of that program may continue until it ends. The
+        operating system releases the lock when this program ends, even after a crash."""
         self._lock = open(self._path + ".lock", "w", encoding="utf-8")
         is_said = False
         while not _locked(self._lock.fileno()):
@@ -717,13 +717,13 @@ class _Ledger:
             _time.sleep(0.02)
 
     def release(self) -> None:
-        """Gives it to the next program before this one has ended."""
+        """Releases the ledger before this program has ended."""
         for file in (self._file, self._lock):
             if file is not None:
                 file.close()
 
     def begin(self) -> None:
-        """A new run: what the last one left is forgotten."""
+        """Begins a new run: discards the contents of the last one."""
         self._file = open(self._path, "w", encoding="utf-8")
 
     def read(self) -> list[dict[str, Any]]:

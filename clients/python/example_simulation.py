@@ -1,5 +1,5 @@
-"""A world for `elbowroom run --world-process "python3 clients/python/example_simulation.py"`: time jumps,
-and everything takes 10 % longer than planned."""
+"""A world for `elbowroom run --world-process "python3 clients/python/example_simulation.py"`: time jumps
+from event to event, and each action takes 10 % longer than planned."""
 
 from elbowroom_world import Simulation
 

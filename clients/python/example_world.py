@@ -1,5 +1,5 @@
-"""A world for `elbowroom run --world-process "python3 clients/python/example_world.py"`: on the wall clock,
-at 20 times its speed. In place of a robot, each action sleeps."""
+"""A world for `elbowroom run --world-process "python3 clients/python/example_world.py"`: it runs at 20 times
+the speed of the wall clock. Each action only sleeps, in place of a robot."""
 
 from elbowroom_world import World
 

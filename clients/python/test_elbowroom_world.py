@@ -21,7 +21,7 @@ def tearDownModule():
 
 
 class Peer:
-    """The other side: Elbowroom, line by line."""
+    """The other end of the protocol: Elbowroom's messages, line by line."""
 
     def __init__(self, world, version=2, resumed=None):
         self.world = world
@@ -53,7 +53,7 @@ class Peer:
         self.tell(type="start", ticket=ticket, action=action, duration=lasts)
 
     def ask(self, **question):
-        """The reports up to `time`, and what time it is."""
+        """Returns the reports up to `time`, and the present time."""
         self._question += 1
         self.tell(question=self._question, **question)
         reports = []
@@ -67,7 +67,7 @@ class Peer:
         return self.ask(type="wait", until={"exact": str(until), "decimal": until})
 
     def reports(self, enough):
-        """Reports from several answers, until there are enough; a slow machine has half a minute."""
+        """Collects reports from several answers until there are enough, for at most half a minute."""
         reports, begun = [], time.monotonic()
         while len(reports) < enough and time.monotonic() - begun < 30:
             more, _ = self.wait(self.world.now() + 1)
@@ -404,7 +404,7 @@ class AfterACrash(unittest.TestCase):
         return world
 
     def before(self):
-        """One action has ended, and one runs, when both sides die."""
+        """One action has ended and one is running when both programs are killed."""
         peer = Peer(self.world(False))
         self.assertIn("resume", peer.greeting["can"])
         peer.start(0, duration=1.0)
@@ -473,7 +473,7 @@ class AfterACrash(unittest.TestCase):
         second = threading.Thread(target=take_over, daemon=True)
         second.start()
         second.join(0.3)
-        # It does not even greet: the first may still move something.
+        # It does not even send the greeting, because actions of the first one may still be running.
         self.assertEqual((taken_over, done), ([], [(0, False)]))
         first.world._ledger.release()
         second.join(30)

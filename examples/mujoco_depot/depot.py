@@ -29,7 +29,7 @@ from world import Depot, NewEngine  # noqa: E402
 ROBOTS = ["alba", "bruno"]
 CRATES = ["red", "green", "blue"]
 DEADLINE = 120
-"""When the truck leaves, in seconds; as in problem.pddl."""
+"""Departure time of the truck in seconds, as in problem.pddl."""
 AS_PLANNED = "as planned"
 
 
@@ -39,7 +39,7 @@ class Outcome:
 
     run: elbowroom.Run
     loaded_at: float
-    """When the last crate was on the truck, or, after it had left, ready for a courier."""
+    """Time at which the last crate was on the truck or, after its departure, ready for a courier."""
     promise: str
     paths: dict[str, list[tuple[float, float]]]
 
@@ -103,13 +103,13 @@ def learn(outcomes: list[Outcome], model: Path) -> Path:
 
 
 def shortest_plan(week: Week) -> elbowroom.Plan:
-    """The last of the planner's ever shorter plans. One thread finds the same ones each time."""
+    """Returns the last and shortest of the planner's plans. With one thread, it finds the same plans in each run."""
     *_, plan = week.problem.plans(jobs=1)
     return plan
 
 
 def likeliest_plan(week: Week, model: Path, budget: int) -> elbowroom.Plan:
-    """The plan that an executor begins with if it believes a model: the likeliest of several.
+    """Returns the first plan of an executor that believes a model: the likeliest of several.
 
     Each morning has the same problem, so that the choice is made once, in a simulated run.
     """
@@ -121,7 +121,7 @@ def likeliest_plan(week: Week, model: Path, budget: int) -> elbowroom.Plan:
 
 
 def predicted(week: Week, plan: elbowroom.Plan, model: Path, samples: int) -> float:
-    """Probability of success by a model: the share of simulated runs that reach the goal."""
+    """Returns the success probability by a model: the share of simulated runs that reach the goal."""
     text = model.read_text()
     runs = (week.problem.run(plan, world=text, seed=k, planning_time=0, trace=False) for k in range(samples))
     return sum(map(bool, runs)) / samples
@@ -136,7 +136,7 @@ def predictions(outcomes: list[Outcome], model: Path, folder: Path) -> dict[str,
 def work_series(
     week: Week, days: range, plan: elbowroom.Plan, model: Path, samples: int, scratch: Path
 ) -> tuple[Series, list[Outcome]]:
-    """Works some days with a plan, and compares them with the predictions of a model."""
+    """Executes a plan on some days, and compares the results with the predictions of a model."""
     outcomes = [week.day(number, plan, model) for number in days]
     folder = scratch / f"{model.stem} {days.start}"
     folder.mkdir()
@@ -153,14 +153,14 @@ def work_series(
 
 
 def way(plan: elbowroom.Plan) -> str:
-    """How a plan brings crates from the rack to the gate, in words."""
+    """Describes the trips of a plan from the rack to the gate."""
     aisle = sum(step.action.startswith("(cross ") for step in plan.steps)
     road = sum(step.action.startswith("(drive ") and "gate" in step.action for step in plan.steps)
     return f"aisle {aisle} times, road {road} times; planned end {float(plan.makespan):.0f} s"
 
 
 def work(week: Week, options: argparse.Namespace, scratch: Path) -> None:
-    """Works, learns, works again, and prints the figures."""
+    """Executes days, learns a model, executes further days with it, and prints the figures."""
     n, samples = options.days, options.samples
     first, second, third = (range(k * n + 1, (k + 1) * n + 1) for k in range(3))
     model = scratch / f"{AS_PLANNED}.toml"
@@ -190,7 +190,7 @@ def work(week: Week, options: argparse.Namespace, scratch: Path) -> None:
 
 
 def save(options: argparse.Namespace, before: Outcome, after: Outcome, scratch: Path) -> None:
-    """Writes what the options ask for."""
+    """Writes the files that the options request."""
     if options.report or options.mcap:
         trace = scratch / "last-day.jsonl"
         trace.write_text(after.run.trace_text or "")

@@ -11,7 +11,7 @@ WIDTH = 80
 
 @dataclass
 class Series:
-    """Figures of days that were worked with the same plan."""
+    """Figures of days with the same plan."""
 
     title: str
     """Two lines, separated by a line break."""

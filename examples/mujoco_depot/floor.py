@@ -25,15 +25,15 @@ GRAVITY = 9.81
 
 @dataclass(frozen=True)
 class Person:
-    """Someone who works in the aisle: walks across it, and stays a while here and there."""
+    """A person who works in the aisle, walks across it, and stays at some places for a while."""
 
     y: float
     speed: float
     stops: tuple[tuple[float, float], ...]
-    """Where across the aisle the person stays, and for how long."""
+    """Places across the aisle at which the person stays, and the durations."""
 
     def position(self, now: float) -> tuple[float, float]:
-        """Where the person is at a time in seconds."""
+        """Returns the place of the person at a time in seconds."""
         x, left = self.stops[0][0], now
         for stop, pause in self.stops:
             walk = abs(stop - x) / self.speed
@@ -48,7 +48,7 @@ class Person:
 
 @dataclass(frozen=True)
 class Day:
-    """Conditions of one day. No planner knows them; the robots feel them."""
+    """Conditions of one day. The planner does not know them, but they affect the robots."""
 
     number: int
     seed: int
@@ -59,7 +59,7 @@ class Day:
     charge_rate: float
 
     def random(self, *about: object) -> random.Random:
-        """Random numbers of one thing on this day: the same ones whatever else happens."""
+        """Random numbers for one purpose on this day, independent of all other events."""
         return random.Random(f"depot {self.seed} {self.number} {about}")
 
     def friction(self, x: float, y: float) -> float:

@@ -32,7 +32,7 @@ class Engine(Protocol):
         """Applies forces for some steps. ``people`` are where they are now."""
 
     def holds(self, mass: float, friction: float) -> bool:
-        """Whether the gripper lifts a crate, or the crate slips out of it."""
+        """Returns ``True`` if the gripper lifts a crate, ``False`` if the crate slips out of it."""
 
 
 class PlainEngine:
@@ -92,7 +92,7 @@ def _push(at: Vector, others: list[Vector]) -> Vector:
 
 
 def _wall(at: Vector) -> float:
-    """Force of the shelves beside the aisle."""
+    """Force of the shelves next to the aisle."""
     aside = at[0] - PLACES["rack"][0]
     overlap = abs(aside) + ROBOT_RADIUS - (AISLE_HALF_WIDTH + 0.3)
     return -math.copysign(4000 * overlap, aside) if WET[0] < at[1] < WET[1] and 0 < overlap < 0.6 else 0.0

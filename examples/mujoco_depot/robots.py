@@ -1,4 +1,4 @@
-"""Control of the robots: what each does with its wheels and its gripper during an action."""
+"""Control of the robots: commands to wheels and gripper during an action."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from physics import MOTOR_FORCE, ROBOT_MASS, Engine, Vector
 
 RATED_SPEED = 1.2
 STOPPING_DISTANCE = 0.2
-"""Way within which a robot must be able to stop, in metres: the range of its bumper's sensors."""
+"""Distance within which a robot must be able to stop, in metres: the range of its bumper's sensors."""
 
 LIFT_POWER = 100.0
 LIFT_HEIGHT = 0.6
@@ -18,7 +18,7 @@ DOCK_TOLERANCE = 0.04
 BACK_OFF_STEPS = 25
 """Control steps for which a robot makes way."""
 SIDES = (0.7, -0.7)
-"""Where robots stand beside a place, in metres."""
+"""Offsets of the robots from a place, in metres."""
 
 Drive = Iterator[tuple[Vector, float]]
 """Target and speed limit of each control step of an action."""
@@ -29,7 +29,7 @@ class Failure(Exception):
 
 
 class Robot:
-    """One robot: its body in the engine, its payload and what it knows of the day."""
+    """One robot: its body in the engine, its payload, and the conditions of the day."""
 
     def __init__(self, name: str, index: int, engine: Engine, day: Day) -> None:
         self.name, self._engine, self._day = name, engine, day
@@ -47,11 +47,11 @@ class Robot:
         return self._engine.position(self.name)
 
     def slot(self, place: str) -> Vector:
-        """Where the robot stands at a place, beside the other one."""
+        """Returns the position of the robot at a place, next to the other one."""
         return standing_place(place, self._side)
 
     def load(self, mass: float) -> None:
-        """Sets the mass of what the gripper holds."""
+        """Sets the mass of the load in the gripper."""
         self.payload = mass
         self._engine.set_payload(self.name, mass)
 
@@ -79,7 +79,7 @@ class Robot:
         return wanted[0] * scale, wanted[1] * scale
 
     def _backs_off(self, speed: float, wanted: float) -> bool:
-        """Whether the robot has pushed against another one for too long, and makes way for a while."""
+        """Returns ``True`` if the robot has pushed against another one for too long, and makes way for a while."""
         if self._steps_back > 0:
             self._steps_back -= 1
             return True
@@ -155,13 +155,13 @@ class Robot:
 
 
 def standing_place(place: str, side: float) -> Vector:
-    """Point beside a place, off the lanes."""
+    """Point next to a place, outside the lanes."""
     x, y = PLACES[place]
     return (x + side, y - 0.5) if place != "gate" else (x + side, y)
 
 
 def _progress(start: Vector, along: Vector, at: Vector) -> float:
-    """Way along a lane, in metres."""
+    """Distance along a lane, in metres."""
     return (at[0] - start[0]) * along[0] + (at[1] - start[1]) * along[1]
 
 

@@ -1,4 +1,4 @@
-"""The depot as a world of Elbowroom: actions move robots, and the physics says when they end."""
+"""The depot as a world of Elbowroom: actions move robots, and the physics determines their ends."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Depot(elbowroom.SteppedWorld):
         self._tasks[robot] = (action, action.words, self._drive(name, self.robots[robot], rest))
 
     def step(self, dt: float) -> str:
-        """Advances all bodies by a control step, or less if the run asks for less."""
+        """Advances all bodies by a control step, or by a shorter time if the run requests it."""
         steps = min(CONTROL_STEPS, math.ceil(round(dt / STEP, 6)))
         self._advance(steps)
         return f"{steps * STEP:.2f}"
@@ -56,7 +56,7 @@ class Depot(elbowroom.SteppedWorld):
             self._tasks[robot] = (None, words, drive)
 
     def settle(self) -> None:
-        """Lets robots end movements whose actions were cancelled."""
+        """Continues movements of cancelled actions until they end."""
         while self._tasks:
             self._advance(CONTROL_STEPS)
 
@@ -126,7 +126,7 @@ def _start_effects(words: list[str]) -> Iterator[tuple[str, bool]]:
 
 
 def _undone(words: list[str]) -> Iterator[tuple[str, bool]]:
-    """Facts after an action that has failed or was cancelled: those before it."""
+    """Returns the facts that a failed or cancelled action changed, with their values before it."""
     return ((fact, not becomes) for fact, becomes in _start_effects(words))
 
 

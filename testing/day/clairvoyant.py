@@ -1,4 +1,4 @@
-"""A schedule of a shift by somebody who knows all tasks and durations in advance, for comparison."""
+"""A schedule of a shift with all tasks and durations known in advance, for comparison."""
 
 import heapq
 import random

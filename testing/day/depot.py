@@ -134,7 +134,7 @@ def tasks(seed, count, seconds):
 
 
 class Truth:
-    """Hidden durations and slips. The same action at the same start of its kind has the same outcome."""
+    """Hidden durations and slips. The n-th start of an action has the same outcome in each run of a seed."""
 
     def __init__(self, seed, robots, common=True):
         self.seed, self.starts = seed, {}

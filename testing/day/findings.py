@@ -1,4 +1,4 @@
-"""Checks of a shift: what the executive claims, compared with what really happened."""
+"""Checks of a shift: the executive's reports, compared with the world's log of the actual events."""
 
 import json
 import subprocess

@@ -1,7 +1,7 @@
 """Predicted and observed success of single missions with a deadline.
 
-Some days are worked to learn a model from their traces. Its prediction is compared with other days, on which the
-durations are independent, or have a factor that is common to all actions of a day.
+A model is learnt from the traces of some days. Its prediction is compared with other days, on which the durations are
+independent, or have a factor that is common to all actions of a day.
 
     python3 missions.py DAY COMMON     is the world of one mission
 """

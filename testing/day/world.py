@@ -1,7 +1,7 @@
-"""The robots of the demonstration "a day", as a program that speaks the protocol of worlds.
+"""The robots of the demonstration "a day", as a world process.
 
-It is started by the executive. The day's folder has its conditions (`conditions.json`); `truth.jsonl` records what
-really happens.
+The executive starts this program. The day's folder contains its conditions (`conditions.json`); `truth.jsonl` records
+the actual events.
 """
 
 import heapq
@@ -112,7 +112,7 @@ class Robots:
             if action.is_resumed:
                 entry = self.planned.get(action.ticket)
                 if entry is None:
-                    # The program was killed between its ledger and its log: the action never began.
+                    # The program was killed between writing the ledger and the log: the action never began.
                     action.failed("the robot was never commanded")
                     return
             else:

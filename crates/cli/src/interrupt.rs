@@ -25,7 +25,7 @@ pub(crate) struct Interrupt(Stop);
 
 impl Interrupt {
     /// Installs the handler: the first Ctrl-C (SIGINT, SIGTERM or SIGHUP) requests a stop, and a
-    /// later one ends the program, see [`is_to_end`]. A process has only one handler, so all calls
+    /// later one ends the program, see [`must_exit`]. A process has only one handler, so all calls
     /// return the same flag. Computations of this thread also end early.
     pub(crate) fn listen() -> Self {
         static INSTALLED: OnceLock<Interrupt> = OnceLock::new();

@@ -123,7 +123,7 @@ struct Layout {
     text: usize,
     /// Columns of the bar; 0 if it does not fit.
     bar: usize,
-    /// `true` if the numbers are on a line of their own below name and quantity.
+    /// `true` if the numbers are on a separate line below name and quantity.
     stacked: bool,
 }
 

@@ -1,6 +1,7 @@
 //! Runs the transcripts in `tests/cmd` and `docs/calendars.md`, which document the command.
 //!
-//! A program of its own, because it changes the current directory, which all tests of a program share.
+//! A separate program, because it changes the current directory, which all tests of a program
+//! share.
 
 use std::path::Path;
 

@@ -152,7 +152,7 @@
 //! - [`sim`]: simulated worlds.
 //! - [`report`]: traces, replays, statistics, tables and plots.
 //!
-//! Experiments that compare executors are a crate of their own, `elbowroom-laboratory`, and so are
+//! Experiments that compare executors are a separate crate, `elbowroom-laboratory`, and so are
 //! exports for other programs, `elbowroom-export`.
 //!
 //! The library reads no clock and no files, and prints nothing.

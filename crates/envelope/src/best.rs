@@ -1,18 +1,19 @@
 //! The largest box inside an envelope, with a proof that there is no larger one.
 //!
-//! The search approaches the envelope from outside. If the oracle refuses a box, the reason is a
-//! [`Cut`]: a linear inequality in the ends of all boxes, or several inequalities, at least one of which
-//! holds. The best box that satisfies all known cuts is at least as good as the best one inside the
-//! envelope. The first such box that the oracle accepts is the best one, and the cuts prove it.
+//! The search approaches the envelope from outside. If the oracle rejects a box, the reason is a
+//! [`Cut`]: a linear inequality in the ends of all boxes, or several inequalities, at least one of
+//! which holds. The best box that satisfies all known cuts is at least as good as the best one
+//! inside the envelope. The first such box that the oracle accepts is the best one, and the cuts
+//! prove it.
 //!
 //! - [`Objective::LeastSlack`]: all ends move out together, relative to their nominal values, until
-//!   one is stopped; the others continue. No linear program is needed ([`fill`]).
+//!   one is stopped; the others continue. No linear program is needed ([`leximin`]).
 //! - [`Objective::Widths`]: a linear program over the cuts, with branch and bound where a cut has
 //!   alternatives ([`branch`]).
 //! - [`Objective::Volume`]: the same, with linear programs over tangents of the logarithm
 //!   ([`volume`]).
 //! - [`Objective::Probability`]: the same with the logarithm of a probability, and with cases for
-//!   values that have a probability of their own ([`probability`]).
+//!   values that have a positive probability ([`probability`]).
 
 mod barrier;
 mod branch;

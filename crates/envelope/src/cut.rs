@@ -1,4 +1,4 @@
-//! Linear inequalities on all boxes, learnt from a refused box: [`Cut`].
+//! Linear inequalities on all boxes, learnt from a rejected box: [`Cut`].
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,8 @@ use elbowroom_plan::{BoxEnd, DecoupledEnvelope, Origin, Side};
 use crate::row::Row;
 use crate::soundness::Broken;
 
-/// Rows, at least one of which holds in every box inside the envelope, and none in the refused box.
+/// Rows, at least one of which holds in every box inside the envelope, and none in the rejected
+/// box.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cut {
     /// The alternatives; usually one.
@@ -30,7 +31,7 @@ pub enum Ground {
     Semireducible(Vec<ProofPath>),
     /// A condition that some schedule violates for some values in a box that violates the row.
     Condition(Broken),
-    /// A box that violates all rows includes this one, which the oracle refuses.
+    /// A box that violates all rows includes this one, which the oracle rejects.
     Box(DecoupledEnvelope),
 }
 
@@ -40,11 +41,11 @@ pub struct ProofPath {
     /// The parts; each begins where the previous one ends.
     pub parts: Vec<ProofPart>,
     /// The constraint (by position in the plan) with the duration whose negated lower end is a
-    /// lower bound on the length of the way.
+    /// lower bound on the length of the path.
     pub unlabelled: Option<usize>,
 }
 
-/// One part of a way.
+/// One part of a path.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ProofPart {
     /// A bound that has to be satisfied.
@@ -53,7 +54,7 @@ pub enum ProofPart {
     Early(usize),
     /// The same duration at its upper end, in the backward direction.
     Late(usize),
-    /// A way that counts as one bound.
+    /// A path that counts as one bound.
     Path(ProofPath),
 }
 

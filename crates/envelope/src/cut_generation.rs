@@ -1,7 +1,7 @@
 //! Derivation of a [`Cut`] from a box without a schedule, or without a strategy.
 //!
 //! A conflict is a cycle of bounds whose length depends linearly on the ends of the box. Every box
-//! with a negative length of this cycle is refused for the same reason. So all boxes inside the
+//! with a negative length of this cycle is rejected for the same reason. So all boxes inside the
 //! envelope satisfy "the length is not negative". A semi-reducible cycle has further conditions:
 //! the part after a duration at its lower end must be negative, and a wait is at least as long as
 //! the minimum duration. So it gives a disjunction: the cycle is not negative, or one of these
@@ -33,9 +33,9 @@ const MAX_ROWS: usize = 64;
 pub(crate) enum CheckOutcome {
     /// The box is accepted.
     Accepted,
-    /// The box is refused, with at least one cut.
+    /// The box is rejected, with at least one cut.
     Cuts(Vec<Cut>),
-    /// The box is refused, but there is no linear cut.
+    /// The box is rejected, but there is no linear cut.
     Unknown,
 }
 
@@ -201,7 +201,7 @@ fn cut(alternatives: Vec<EndSum>, ground: Ground, envelope: &DecoupledEnvelope) 
 /// Returns all sums of one element of each list.
 fn sums(mut some: Vec<EndSum>, others: &[EndSum]) -> Vec<EndSum> {
     if let [other] = others {
-        // The usual case, and a way may have thousands of parts.
+        // The usual case, and a path may have thousands of parts.
         for one in &mut some {
             one.add(other);
         }
@@ -233,8 +233,8 @@ fn whole_cycle_cut<'a>(
     cut(vec![total], Ground::Cycle(origins), envelope)
 }
 
-/// Returns the steps of a cycle in order, without the structure of ways, which are nested as deeply
-/// as a plan is long.
+/// Returns the steps of a cycle in order, without the structure of paths, which are nested as
+/// deeply as a plan is long.
 fn steps(cycle: &[RefutationPath]) -> impl Iterator<Item = &Part> {
     let mut open: Vec<&Part> = cycle.iter().flat_map(|way| &way.parts).rev().collect();
     std::iter::from_fn(move || {
@@ -274,7 +274,7 @@ impl Reader<'_> {
         cut(rows, ground, envelope)
     }
 
-    /// Returns the length of a step, and the bound that it represents; `None` for a way.
+    /// Returns the length of a step, and the bound that it represents; `None` for a path.
     fn step_length(&self, part: &Part) -> Option<(Length, Origin)> {
         let constraint = |link: &LinkId| self.network.links[link.index()];
         Some(match part {
@@ -352,8 +352,8 @@ impl Reader<'_> {
         Some((Length::End(end, Rational::from(sign)), origin))
     }
 
-    /// Returns the possible lengths of a way; the greatest of them applies. Adds to `legal` the
-    /// lengths that have to be negative for the way to exist.
+    /// Returns the possible lengths of a path; the greatest of them applies. Adds to `legal` the
+    /// lengths that have to be negative for the path to exist.
     fn lengths(&self, way: &RefutationPath, legal: &mut Vec<EndSum>) -> Option<Vec<EndSum>> {
         let mut lengths = vec![EndSum::default()];
         for part in way.parts.iter().rev() {
@@ -378,7 +378,7 @@ impl Reader<'_> {
         Some(lengths)
     }
 
-    /// Converts a way to the terms of the plan.
+    /// Converts a path to the terms of the plan.
     fn proof_path(&self, way: &RefutationPath) -> Option<ProofPath> {
         let constraint = |link: LinkId| self.network.links[link.index()];
         let parts = way.parts.iter().map(|part| {

@@ -1,4 +1,4 @@
-//! Known reasons that refuse wider boxes: [`Known`].
+//! Known reasons for rejecting wider boxes: [`CutPool`].
 
 use std::cmp::Ordering;
 use std::collections::BTreeSet;
@@ -13,7 +13,7 @@ use crate::row::Row;
 /// The cuts that a search has found, and the slack of each in the present box, which is inside the
 /// envelope.
 ///
-/// Queries are about wider boxes only, so a cut that refuses a box with one end moved contains that
+/// Queries are about wider boxes only, so a cut that rejects a box with one end moved contains that
 /// end in one of its rows. An index by end and the slack of each row make a query cheap, whatever
 /// the number of parameters in a cut.
 #[derive(Clone, Debug, Default)]
@@ -130,7 +130,7 @@ impl CutPool {
         to.is_none() && self.finite.contains(&end) || self.refusing_rows(end, from, to).is_some()
     }
 
-    /// Returns the rows that refuse that box, and the proof that one of them has to hold.
+    /// Returns the rows that reject that box, and the proof that one of them has to hold.
     pub(crate) fn refusing_rows(
         &self,
         end: BoxEnd,

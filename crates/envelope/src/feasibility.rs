@@ -32,7 +32,7 @@ pub(crate) const MAX_BRANCHES: usize = 1 << 14;
 /// A parameter that *is* a difference of times may have further bounds on the same difference (an
 /// action whose start and end interfere takes at least ε). These bounds limit the parameter,
 /// independently of the others, and have no other effect. They are checked separately
-/// ([`own_limits`]).
+/// ([`own_limits`](Self::own_limits)).
 #[derive(Clone, Debug)]
 pub(crate) struct Feasibility {
     /// The reduced network's edges.
@@ -289,7 +289,7 @@ impl Feasibility {
         self.network_where(self.edges(), |edge| self.bound(edge, sides, envelope))
     }
 
-    /// Returns the network with these bounds, if it is consistent; `None` is no bound.
+    /// Returns the network with these bounds, if it is consistent; `None` means no bound.
     fn network_where<'a>(
         &self,
         edges: impl Iterator<Item = &'a Edge>,

@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Growth {
-    /// Steps double until both directions of the parameter have been refused for the first time, as
-    /// in the authors' code.
+    /// Steps double until both directions of the parameter have been rejected for the first time,
+    /// as in the authors' code.
     #[default]
     Doubling,
     /// Steps stay constant, as in the paper.
@@ -40,7 +40,7 @@ struct Progress {
     is_open: [bool; 2],
     /// Directions without further gain: lower, upper.
     is_done: [bool; 2],
-    /// `true` if both directions have been refused at least once.
+    /// `true` if both directions have been rejected at least once.
     has_halved: bool,
 }
 

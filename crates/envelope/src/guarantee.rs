@@ -78,7 +78,7 @@ pub(crate) enum Controllability {
 pub(crate) struct Control {
     pub(crate) plan: Arc<ParametrizedPlan>,
     /// Feasibility check, computed on first use. Values without any schedule are a better
-    /// explanation of a refusal than a conflict. For many plans it is never needed.
+    /// explanation of a rejection than a conflict. For many plans it is never needed.
     feasibility: OnceLock<Feasibility>,
 }
 
@@ -118,7 +118,7 @@ impl Controllability {
         }
     }
 
-    /// Returns the reason why the box is refused, if it is.
+    /// Returns the reason why the box is rejected, if it is.
     ///
     /// If `moved` is given, the box differs from the last accepted one only in that end, which is
     /// further out.
@@ -160,7 +160,7 @@ impl Controllability {
         }
     }
 
-    /// Returns at most `most` cuts that refuse the box, and possibly others.
+    /// Returns at most `most` cuts that reject the box, and possibly others.
     ///
     /// # Errors
     /// If there are too many cases to decide.

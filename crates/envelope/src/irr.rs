@@ -20,7 +20,7 @@ use speculative::Speculation;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Settings {
     /// The search ends when all steps are below this (β of Algorithm 1); positive. A step is halved
-    /// when both ends of its parameter have been refused, so an end may still have a slack of
+    /// when both ends of its parameter have been rejected, so an end may still have a slack of
     /// almost twice as much: [`sharpen`](crate::sharpen()) moves each end to its limit.
     pub precision: Rational,
     /// If present, each parameter's precision is this share of its nominal value instead, and its
@@ -138,13 +138,13 @@ pub struct IrrRun {
 ///
 /// Invariant: the box lies inside the robustness envelope at every iteration, including the first:
 /// the start point is checked like any other box. `on_step` is called with each wider box, and with
-/// `None` at every refusal, so that it can end the search at any moment. The result found so far is
-/// kept. An undecided wider box is treated as refused.
+/// `None` at every rejection, so that it can end the search at any moment. The result found so far
+/// is kept. An undecided wider box is treated as rejected.
 ///
 /// The steps, their outcomes and their number are those of one check after the other, but boxes
 /// with a known outcome are not checked. Many boxes are found inside by checking the last of them,
-/// and many are refused for a reason that already refused another one. If long conflicts are
-/// divided ([`Settings::divide_after`]), some steps are refused that a check would accept.
+/// and many are rejected for a reason that already rejected another one. If long conflicts are
+/// divided ([`Settings::divide_after`]), some steps are rejected that a check would accept.
 ///
 /// # Errors
 /// If the start point is undecided.
@@ -246,5 +246,5 @@ fn limit(
     }
 }
 
-/// Divisor of the [`farthest`] value: an end beyond the quotient may have no limit.
+/// Divisor of [`max_reach`]: an end that can move beyond the quotient may have no limit.
 const FAR_DIVISOR: i64 = 4;

@@ -32,7 +32,7 @@ pub(crate) struct SearchBounds {
     pub(crate) lower_bound: Rational,
     /// No box with a greater number is inside; the same as `inside` if that is exact.
     pub(crate) upper_bound: Rational,
-    /// Cut that refuses greater numbers, by position; `None` if only the caller's limit does, or if
+    /// Cut that rejects greater numbers, by position; `None` if only the caller's limit does, or if
     /// the reason is not linear.
     pub(crate) cut: Option<usize>,
 }
@@ -87,7 +87,7 @@ impl LineSearch {
     /// Searches for the greatest number from `least` to `most` whose box is inside the envelope.
     /// The box of `least` must be inside.
     ///
-    /// A refused box yields cuts. The greatest number that satisfies them is checked next, so the
+    /// A rejected box yields cuts. The greatest number that satisfies them is checked next, so the
     /// first accepted number is the result. If no linear cut is known, the interval is halved. New
     /// cuts are added to `cuts`. `on_step` receives the greatest number so far before each check,
     /// and can end the search.

@@ -81,7 +81,7 @@ enum Reason {
 
 impl Oracle {
     /// Creates the oracle for a plan. If the plan has no schedule at its nominal values, every box
-    /// that contains them is refused for that reason.
+    /// that contains them is rejected for that reason.
     ///
     /// # Errors
     /// If the plan contains something beyond exact linear reasoning; the message names it.
@@ -167,7 +167,7 @@ impl Oracle {
         self.checks
     }
 
-    /// Returns the number of checked boxes that were refused because some values have no schedule.
+    /// Returns the number of checked boxes that were rejected because some values have no schedule.
     pub fn without_schedule(&self) -> usize {
         self.without_schedule
     }
@@ -289,8 +289,8 @@ impl Oracle {
         self.soundness.as_ref()?.counterexample(envelope, broken)
     }
 
-    /// Moves an end of the accepted box out. Returns the wider box and the reason if it is refused;
-    /// `None` if it is the accepted box now.
+    /// Moves an end of the accepted box out. Returns the wider box and the reason if it is
+    /// rejected; `None` if it is the accepted box now.
     fn widen(
         &mut self,
         end: BoxEnd,
@@ -356,7 +356,7 @@ impl Oracle {
             return self.check_from_scratch(candidate);
         }
         self.checks += 1;
-        // Proofs found for a refused box that is not the last accepted one with an end moved out
+        // Proofs found for a rejected box that is not the last accepted one with an end moved out
         // may not hold in the last accepted one. The moved end then says nothing about them.
         let trusted = self.proofs_hold_in_last.then_some(end);
         let reason = self.sound_and_controllable(candidate, Some(end), trusted);

@@ -170,7 +170,7 @@ fn nodes_of(broken: &Broken, count: usize) -> Vec<NodeId> {
                 }),
         );
     }
-    // The moment inside an over-all condition is no node of the plan.
+    // The moment inside an over-all condition is not a node of the plan.
     nodes.retain(|node| node.index() < count);
     if let Requirement::Condition { node, .. }
     | Requirement::Defined { node, .. }
@@ -278,7 +278,7 @@ impl Growth<'_> {
         let steps = steps(scale, epsilon).into_iter();
         for step in steps.filter(|step| !is_shared || *step >= share) {
             let mut open = ends.clone();
-            // Four steps of one size exceed the next larger one, which was refused unless the end
+            // Four steps of one size exceed the next larger one, which was rejected unless the end
             // is unlimited.
             for _ in 0..MOST_STEPS {
                 open.retain(|&end| self.try_move(end, &step));

@@ -81,7 +81,7 @@ pub struct Repair {
 /// Result of a search for a repair.
 #[derive(Clone, Debug, PartialEq)]
 pub enum RepairRun {
-    /// A repair was found, and none is cheaper.
+    /// A repair was found, and no cheaper one exists.
     Repaired {
         /// The repair.
         repair: Repair,

@@ -60,7 +60,7 @@ fn push(
         return ControlFlow::Continue(());
     }
     let farthest = max_reach(oracle.plan().parameter(end.parameter));
-    // An undecided box counts as refused.
+    // An undecided box counts as rejected.
     let mut accepts = |reach| oracle.try_reach(end, reach).unwrap_or(false);
     if accepts(border.clone()) {
         return on_step();

@@ -137,7 +137,7 @@ impl Soundness {
     /// schedule there.
     ///
     /// Happenings are required to keep the order that they have there. In a box that contains these
-    /// values, that is no restriction. In others, a different order may also work.
+    /// values, this is not a restriction. In others, a different order may also work.
     ///
     /// # Errors
     /// If the plan contains something beyond exact linear reasoning.

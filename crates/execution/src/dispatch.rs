@@ -2,8 +2,9 @@
 //!
 //! A time point is *ready* when everything that must come before it has been observed. It is
 //! started as soon as its window opens (paper 1, Algorithm 2, lines 6 to 10). Executed time points
-//! are fixed in the network. With a whole [`Horizon`], this updates the windows of all others,
-//! including deadlines. The work per event is proportional to the number of windows that change.
+//! are fixed in the network. With [`PropagationReach::WholeNetwork`], this updates the windows of
+//! all others, including deadlines. The work per event is proportional to the number of windows
+//! that change.
 
 mod decide;
 mod explain;
@@ -40,7 +41,7 @@ use retry::Retry;
 /// Finite bounds of a constraint.
 pub(crate) type Bounds = (Option<Rational>, Option<Rational>);
 
-/// The reach of constraint propagation; see [`Horizon`].
+/// The reach of constraint propagation: the whole network, or only the neighbours of an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum PropagationReach {
     WholeNetwork,
@@ -95,7 +96,8 @@ pub(crate) struct Dispatch {
     /// Bounds on the duration of each instance.
     durations: Vec<Bounds>,
     progress: PlanProgress,
-    /// See [`watch::numbers_of_durations`].
+    /// For each instance, the bounds on its duration that depend on numbers
+    /// ([`decide::numeric_duration_bounds`]).
     numbers_of_durations: BTreeMap<InstanceId, Vec<DurationConstraint>>,
     /// The times, on the plan's clock, at which instances were commanded whose start has not been
     /// observed.

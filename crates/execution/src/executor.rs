@@ -86,7 +86,7 @@ pub trait Executor: Send {
         false
     }
 
-    /// Returns `true` if this plan is better than the rest of the present one.
+    /// Returns `true` if this plan is better than the remaining present plan.
     fn prefers_plan(&self, _mission: &PreparedPlan, _now: &Rational) -> bool {
         false
     }
@@ -104,7 +104,7 @@ pub trait Executor: Send {
     }
 
     /// Returns a copy of the executor in its present state, which makes the same decisions.
-    /// Rehearsals use it to simulate the rest of the run. `None` if the executor cannot be copied.
+    /// Rollouts use it to simulate the remaining run. `None` if the executor cannot be copied.
     fn fork(&self) -> Option<Box<dyn Executor>> {
         None
     }

@@ -31,7 +31,7 @@
 //!
 //! With background planning ([`RunSettings::plans_aside`]), execution continues during a search:
 //!
-//! | a plan is needed because | until it is there |
+//! | a plan is needed because | until the plan exists |
 //! | --- | --- |
 //! | goals were added or abandoned | the present plan continues. The new plan starts from the state that is expected when planning ends; actions that start until then are committed |
 //! | the present plan is infeasible, or there is none | nothing is started; running actions continue and are monitored |
@@ -72,8 +72,8 @@
 //! world that cannot be reached any more receives no commands.
 //!
 //! The goal counts as reached only when no action is running, nothing is in doubt, the last timed
-//! initial that affects the goal has happened, and the world has had the chance to look
-//! ([`World::look`]).
+//! initial that affects the goal has happened, and the world has had an opportunity to observe the
+//! goal ([`World::look`]).
 
 mod abandoned_plan;
 mod action_log;
@@ -175,8 +175,8 @@ pub struct Run<'a> {
     reasons: Vec<Reason>,
     /// The expected planning time.
     expected_planning_time: Rational,
-    /// The task with its goals, the situation and the guess of the last awaited request whose
-    /// answer was a plan.
+    /// The last awaited request whose answer was a plan: the task with its goals, the situation,
+    /// and the assumption about late actions.
     planned_for: Option<(Arc<Task>, Situation, situation::OverrunEstimate)>,
     /// All believed observations, in order.
     history: Vec<BelievedEvent>,
@@ -187,7 +187,7 @@ pub struct Run<'a> {
     anticipated_replan: Option<AnticipatedReplan>,
     /// The belief before the first event of the history.
     initial_belief: BeliefState,
-    /// Receives the belief whenever reports were processed.
+    /// Callback that receives the belief whenever reports were processed.
     listener: Box<dyn FnMut(&BeliefState) + Send + 'a>,
     /// State of an executive, or of an attended run.
     goal_manager: Option<GoalManager<'a>>,
@@ -213,7 +213,7 @@ pub struct Run<'a> {
     shutdown: Option<Shutdown>,
     /// The report, once the run is over.
     report: Option<Report>,
-    /// Number of times that the run continues after it was over.
+    /// Number of times that the run was continued after its end.
     restarts_left: usize,
 }
 
@@ -330,7 +330,7 @@ impl<'a> Run<'a> {
         decided
     }
 
-    /// Makes a decision, and adds its consequences to the agenda.
+    /// Makes a decision, and adds its consequences to the work queue.
     fn decide_and_enqueue(&mut self) -> Result<(), Stop> {
         self.check_stop_request()?;
         self.close_momentary_goals();
@@ -457,8 +457,8 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Requests a look at the goal, which the executor considers reached. The world's answer
-    /// decides.
+    /// Requests an observation of the goal, which the executor considers reached. The world's
+    /// answer decides.
     fn request_goal_look(&mut self) {
         let task = self.belief.task();
         let mut footprint = Footprint::of_condition(task, task.goal());
@@ -472,7 +472,7 @@ impl<'a> Run<'a> {
         self.goal_status_without_plan() == Some(GoalStatus::Reached)
     }
 
-    /// Returns the outlook if the goal holds, or will hold, without further actions.
+    /// Returns the status of the goal if it holds, or will hold, without further actions.
     fn goal_status_without_plan(&self) -> Option<GoalStatus> {
         let is_idle = self.action_log.open_tickets().next().is_none();
         let outlook = is_idle.then(|| self.belief.goal_status());

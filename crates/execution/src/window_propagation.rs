@@ -33,7 +33,7 @@ pub(crate) enum NetworkLimit {
     Link(LinkId),
 }
 
-/// See [`Horizon::OneHop`].
+/// See [`PropagationReach::OneHop`](crate::dispatch::PropagationReach::OneHop).
 #[derive(Clone, Debug)]
 pub(crate) struct OneHop {
     network: Network,
@@ -109,8 +109,8 @@ impl WindowPropagation {
         }
     }
 
-    /// Executes a node at `time`. If that is outside its window, [`Horizon::Whole`] does not record
-    /// it; the others do.
+    /// Executes a node at `time`. If that is outside its window,
+    /// [`WholeNetwork`](Self::WholeNetwork) does not record it; the others do.
     pub(crate) fn fix(&mut self, node: NodeId, time: &Rational) -> Result<(), Missed> {
         match self {
             Self::WholeNetwork(windows) => windows.fix(node, time).map_err(|out| Missed {

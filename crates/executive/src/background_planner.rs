@@ -62,7 +62,8 @@ impl Work {
 }
 
 impl<'a> BackgroundPlanner<'a> {
-    /// Creates a planner for runs of `spec`. `inner` is used where no plan was begun in the background.
+    /// Creates a planner for runs of `spec`. `inner` makes the plans that were not begun in the
+    /// background.
     pub fn new(
         inner: Box<dyn Planner + 'a>,
         spec: &RunSpec,
@@ -138,7 +139,7 @@ impl Planner for BackgroundPlanner<'_> {
 
     fn expect(&mut self, task: &Task, situation: &Situation) {
         self.job = None;
-        // A planner that compares probabilities keeps its results between plans.
+        // A planner that compares probabilities reuses results for later plans.
         if !self.spec.executor.needs_comparator() {
             self.job = self.spawn(task, situation);
         }

@@ -35,7 +35,7 @@ pub enum Completion {
 /// another question to the world.
 const SHORT_WAIT: Duration = Duration::from_millis(2);
 
-/// Guard of a background task. Reports completion when dropped, also after a panic of its thread.
+/// Guard of a background task. Reports completion when dropped, even after a panic of its thread.
 pub struct NotifyOnDrop {
     is_done: Arc<AtomicBool>,
     signal: CompletionSignal,

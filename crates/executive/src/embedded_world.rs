@@ -3,8 +3,8 @@
 use elbowroom::execution::{ActionHandle, TimeAdvance, World, WorldError};
 use elbowroom::num::Rational;
 
-/// World that is an object in the process of its executive, instead of a simulation or a process of
-/// its own.
+/// World that is an object in the process of its executive, instead of a simulation or a separate
+/// process.
 ///
 /// After a crash, a new object takes its place and reports the outcomes of the actions that were
 /// running.

@@ -274,7 +274,8 @@ impl Executive {
     /// Executes the run as [`Executive::run`] does, in a world that is an object in this process.
     ///
     /// # Errors
-    /// When the run cannot be started, was started before, or its world is none in this process.
+    /// When the run cannot be started, was started before, or its world is not an object in this
+    /// process.
     pub fn run_in(&self, world: &mut dyn EmbeddedWorld) -> Result<JournaledOutcome, RunError> {
         self.run_with(Some(world))
     }

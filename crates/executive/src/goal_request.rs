@@ -21,7 +21,7 @@ impl GoalNames {
     /// Returns names that differ from these.
     pub(crate) fn after<'a>(names: impl Iterator<Item = &'a str>) -> Self {
         let numbers = names.filter_map(|name| name.strip_prefix(PREFIX)?.parse::<u64>().ok());
-        // Larger numbers are not from here.
+        // Larger numbers were not generated here.
         let last = numbers.filter(|it| u32::try_from(*it).is_ok()).max();
         Self(AtomicU64::new(last.unwrap_or_default()))
     }

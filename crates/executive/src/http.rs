@@ -23,8 +23,9 @@ use request::read;
 /// Time limit for a client to read a part of its response.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// Serves clients, each in a thread of its own, until the program ends. Returns at once. `is_known` returns `true` for
-/// requests with the token; clients without it cannot exhaust their limits. `handler` writes the response.
+/// Serves clients, each in a separate thread, until the program ends. Returns at once. `is_known`
+/// returns `true` for requests with the token; clients without it cannot exhaust their limits.
+/// `handler` writes the response.
 pub fn serve(
     listener: Listener,
     is_known: impl Fn(&Request) -> bool + Send + Sync + 'static,

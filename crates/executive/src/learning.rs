@@ -121,7 +121,7 @@ impl Learner {
         Ok(())
     }
 
-    /// Reads the logs of the folder that are about the domain of the run, oldest first.
+    /// Reads the logs in the folder that belong to the domain of the run, oldest first.
     fn logs(&mut self) -> io::Result<Vec<Log>> {
         let own = read_log(&self.journal).ok().and_then(|it| it.domain);
         let mut paths: Vec<PathBuf> = Vec::new();
@@ -137,7 +137,7 @@ impl Learner {
         let mut logs = Vec::with_capacity(paths.len());
         for path in paths {
             let why = match read_log(&path) {
-                // A journal in this folder, which has its copy beside it.
+                // A journal in this folder. Its copy is in the same folder.
                 Ok(StoredLog {
                     copy: Some(copy), ..
                 }) if self.has_other(&copy, &path) => continue,
@@ -235,7 +235,7 @@ fn replace(path: &Path, text: &str) -> io::Result<()> {
     fs::rename(new, path)
 }
 
-/// Learning in a thread of its own: whenever the executive rests, and at the end of the run.
+/// Learning in a separate thread: whenever the executive is idle, and at the end of the run.
 pub struct Learning {
     missions: Sender<()>,
     thread: JoinHandle<()>,

@@ -1,11 +1,12 @@
-//! Persistent execution of temporal plans: everything that an executive needs beside the state machine
-//! of `elbowroom::execution`.
+//! Persistent execution of temporal plans: everything that an executive needs in addition to the
+//! state machine of `elbowroom::execution`.
 //!
 //! [`Executive`] is the entry point for programs that embed an executive: it accepts goals, executes plans for them, and
 //! resumes its run after a crash. The parts below are for programs that assemble a run themselves.
 //!
-//! - [`journal`], [`journaling`]: append-only record of a run that survives a crash (`docs/formats/journal.md`), and
-//!   the recorder and world decorator that write it ahead of each command.
+//! - [`journal`], [`journaling`]: append-only record of a run that survives a crash
+//!   (`docs/formats/journal.md`), and the recorder and the world decorator that write it before
+//!   each command is sent.
 //! - [`request_queue`], [`operator`]: bounded queue of operators' requests, and the world decorator that adds them to
 //!   the observations of the run.
 //! - [`background_planner`], [`background_preparer`], [`completion_signal`]: planning during the run.

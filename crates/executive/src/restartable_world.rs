@@ -1,7 +1,8 @@
-//! World that can be connected again: when a run is resumed from its journal, and when the program of a world ends
-//! while the run continues.
+//! World that can be connected again: when a run is resumed from its journal, and when the world's
+//! program ends during the run.
 //!
-//! After that, the world is asked about the actions that were running. Those that it does not know have failed.
+//! After a reconnection, the run requests the outcomes of the actions that were running. Actions
+//! that the world does not know have failed.
 
 use std::time::Duration;
 
@@ -32,7 +33,7 @@ const POLL_INTERVAL: Duration = Duration::from_millis(50);
 /// Computes the world's time since the last record, or returns the reason why it is unknown.
 pub(crate) type Elapsed<'a> = Box<dyn Fn() -> Result<Rational, &'static str> + Send + 'a>;
 
-/// See the module.
+/// World decorator that connects its world when it is needed; see the module.
 pub(crate) struct RestartableWorld<'a> {
     launch: Launch<'a>,
     world: Option<WorldConnection<'a>>,
@@ -48,7 +49,8 @@ pub(crate) struct RestartableWorld<'a> {
     shift: Rational,
     /// Outcome of the actions that were running, until the run has received it.
     news: Option<Vec<Observation>>,
-    /// Restarts since the program was last reliable, and since when it runs.
+    /// Number of restarts since the program last ran without failure for long enough, and the time
+    /// of its start.
     restarts: u32,
     started: Clock,
 }
@@ -188,7 +190,8 @@ impl<'a> RestartableWorld<'a> {
         Ok(())
     }
 
-    /// Starts a program again after a failure, as often as it may be, and returns the failure otherwise.
+    /// Restarts a program after a failure, up to the limit on restarts. Returns the failure if the
+    /// limit is reached.
     fn restart(&mut self, failure: WorldError) -> Result<(), WorldError> {
         let mut failure = failure;
         if self.started.elapsed() > RELIABLE_AFTER {
@@ -254,7 +257,7 @@ impl<'a> RestartableWorld<'a> {
         }
     }
 
-    /// Returns what became known at a restart, with the time.
+    /// Returns the outcomes that became known at a restart, with the time.
     fn take_recalled(&mut self) -> Option<TimeAdvance> {
         let observations = self.news.take()?;
         let now = self.last.clone();

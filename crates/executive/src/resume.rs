@@ -50,7 +50,7 @@ pub struct InterruptedRun {
     length: u64,
     stored: Stored,
     spec: RunSpec,
-    /// The journal, once it is opened.
+    /// The journal; `None` until it is opened.
     file: Option<JournalFile>,
 }
 
@@ -82,7 +82,8 @@ impl InterruptedRun {
     /// Reads a journal: its path, its text, and the length of the file in bytes.
     ///
     /// # Errors
-    /// When the text is no journal, the journal is damaged, or its run is finished and has not reached its goal.
+    /// When the text is not a journal, the journal is damaged, or its run is finished and has not
+    /// reached its goal.
     pub fn read(path: &Path, text: &str, length: u64) -> Result<JournaledRun, Error> {
         let name = path.display().to_string();
         if !is_journal(text) {

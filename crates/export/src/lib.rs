@@ -2,8 +2,8 @@
 //!
 //! - [`stnu`]: the network of a plan whose parameters lie in a box, as an STNU, for any checker of
 //!   controllability.
-//! - [`box_check`]: the check whether a plan is guaranteed to work in a box, as SMT-LIB 2. Each answer
-//!   is `unsat` exactly if it is.
+//! - [`box_check`]: the check whether a plan is guaranteed to work in a box, as SMT-LIB 2. The plan
+//!   is guaranteed to work exactly if each answer is `unsat`.
 //! - [`region`]: all values for which a plan works, as SMT-LIB 2.
 //! - [`prism`]: decision processes in the language of PRISM, without time and on a clock. Their
 //!   optimum is the success probability of the best executor.
@@ -76,7 +76,7 @@ pub enum ExportError {
     /// The plan is beyond exact analysis.
     #[error("this plan cannot be exported: {0}")]
     Refused(Refusal),
-    /// A bound has to hold for an unbounded parameter.
+    /// A bound would have to hold for all values of an unbounded parameter.
     #[error(
         "a bound of the plan must hold for all values of {parameter}, but its interval is \
          unbounded: give finite bounds"

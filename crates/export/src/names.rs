@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use elbowroom_plan::{NodeId, StnPlan};
 
 /// Returns the names of a plan's time points, by node: `n0_start` for the start of `n0`, and `Z`
-/// for time zero, as is usual in the field.
+/// for time zero, as in the literature.
 pub(super) fn points(plan: &StnPlan) -> Vec<String> {
     distinct(plan.nodes().map(|(node, _)| {
         if node == NodeId::ZERO {

@@ -315,7 +315,7 @@ impl<'a, 'r> Run<'a, 'r> {
     }
 }
 
-/// Returns the signal that ended the planner, also if a shell reports it by an exit code above 128.
+/// Returns the signal that ended the planner, even if a shell reports it by an exit code above 128.
 fn crash_signal(ending: Ending) -> Option<i32> {
     /// Signals sent by the system to end a faulty program.
     const FAULTS: [i32; 6] = [4, 6, 7, 8, 9, 11];

@@ -204,7 +204,7 @@ impl CompareAnswer {
     /// Reads results as JSON.
     ///
     /// # Errors
-    /// The text does not hold results, or those of another experiment.
+    /// The text does not contain results, or those of another experiment.
     pub fn read(text: &str, experiment: &AnyExperiment) -> Result<Self, CompareError> {
         let (answer, is_of_it) = match experiment {
             AnyExperiment::Timed(experiment) => {

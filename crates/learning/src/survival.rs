@@ -1,7 +1,7 @@
 //! Right-censored samples: observed values, and lower bounds of values whose actions were cancelled
 //! or failed before they ended.
 
-/// A value, or a lower bound of one.
+/// An observed value, or a lower bound on a value that was not observed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
     /// The value, or its lower bound.

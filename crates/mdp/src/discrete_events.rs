@@ -102,7 +102,7 @@ impl CellProbabilities {
     }
 
     /// Returns `true` if the goal may be reachable in time from a state at the beginning of a cell,
-    /// by the relaxation of [`soonest`](Self::soonest).
+    /// by the relaxation of [`earliest_goal_cell`](Self::earliest_goal_cell).
     pub(super) fn can_reach_goal_in_time(
         &self,
         world: &TimedWorld,

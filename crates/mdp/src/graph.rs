@@ -38,9 +38,9 @@ pub(super) struct Nodes {
     cell: u32,
     /// By node: the end of its choices.
     ends: Vec<u32>,
-    /// By choice: the end of its ways.
+    /// By choice: the end of its results.
     choices: Vec<u32>,
-    /// By way: its probability, and the end of its targets.
+    /// By result: its probability, and the end of its targets.
     ways: Vec<(f64, u32)>,
     targets: Vec<Target>,
 }
@@ -108,14 +108,15 @@ impl Limits<'_> {
     }
 }
 
-/// Maximum average number of ways of a node, when the maximum number of nodes is reached.
+/// Maximum average number of results of a node's choices, when the maximum number of nodes is
+/// reached.
 const WAYS: usize = 16;
 
 /// Limit on the combinations of events of one state in a cell. It is needed because each running action
 /// may end or not, so their number grows exponentially.
 pub(super) const MOST_WAYS: usize = 1 << 16;
 
-/// Work for each node and each of its ways, in units of [`elbowroom_num::work`].
+/// Work for each node and each result of its choices, in units of [`elbowroom_num::work`].
 const NODE_WORK: u64 = 500;
 const WAY_WORK: u64 = 300;
 
@@ -307,7 +308,7 @@ fn explore_forward(
     }
 }
 
-/// Discount factors. They make the shorter of two equally likely ways more valuable.
+/// Discount factors. They make the shorter of two equally likely paths to the goal more valuable.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Discounts {
     /// Factor per cell.

@@ -32,8 +32,8 @@
 //!   between them have the worst order. This is a policy of the real process, so its value is at
 //!   most the best.
 //!
-//! Neither assumes that it is never harmful to be earlier. If it is never harmful (no condition
-//! requires a fact to be false), fewer cases are examined.
+//! Neither bound assumes that an earlier happening is never harmful. If it is never harmful (no
+//! condition requires a fact to be false), fewer cases are examined.
 //!
 //! If everything happens at known times, there is no grid: states exist only when something happens
 //! or becomes ready to happen (`discrete_events`).

@@ -18,10 +18,11 @@ const MOST_ORDERED: usize = 5;
 pub(super) enum DecisionEpochs {
     /// Any move at every boundary.
     Always,
-    /// Moves only after a happening, and at time 0. Useful actions must be started then.
+    /// Moves only after a happening, and at time 0. At these times, the agent must start all useful
+    /// actions.
     AfterHappenings,
-    /// The same for worlds where everything happens at [known times](super::moments), without
-    /// cancelling. Only actions that are bits of this number must be started.
+    /// The same for worlds where everything happens at [known times](super::discrete_events),
+    /// without cancelling. The bits of this number are the actions that must be started.
     AtKnownTimes(u64),
 }
 
@@ -73,9 +74,9 @@ fn moves(world: &TimedWorld, state: &State) -> Vec<Move> {
     cancelled.chain(started).chain([Move::Wait]).collect()
 }
 
-/// Restricts the moves of an agent that acts only after a happening. It neither waits nor cancels
-/// while it can start an action that aborts no running action and is not aborted itself. It starts
-/// no other actions than these. Actions outside `must` may be started, but need not be.
+/// Restricts the moves of an agent that acts only after a happening. The agent starts only actions
+/// that abort no running action and are not aborted at once. While it can start such an action, it
+/// neither waits nor cancels. Actions outside `must` may be started, but need not be.
 fn require_useful_starts(world: &TimedWorld, state: &State, must: u64, moves: &mut Vec<Move>) {
     let breaks_nothing = |choice: &Move| match choice {
         Move::Start(act) => {
@@ -112,7 +113,7 @@ struct Cell<'c> {
 }
 
 impl<'a> LowerBound<'a> {
-    /// Creates the bound. Every manner is a policy, so it yields a lower bound.
+    /// Creates the bound. Each restriction (`manner`) is a policy, so its value is a lower bound.
     pub(super) fn new(
         world: &'a TimedWorld,
         chances: &'a CellProbabilities,
@@ -125,7 +126,7 @@ impl<'a> LowerBound<'a> {
         }
     }
 
-    /// Returns the moves in a state that the manner allows, a part of [`moves`].
+    /// Returns the moves of [`moves`] that the restriction allows.
     pub(super) fn moves(&self, state: &State) -> Vec<Move> {
         let mut moves = moves(self.world, state);
         let must = match self.epochs {

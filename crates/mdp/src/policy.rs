@@ -23,8 +23,9 @@ use super::{
 /// Table of the values of all states on the grid of the lower bound, for evaluating each move.
 ///
 /// An agent that always makes the most valuable move at the boundaries of cells succeeds with a
-/// probability of at least [`TimedOptimum::lower`], except for the ten-thousandth that is traded
-/// for being earlier, and for the separation of happenings by ε.
+/// probability of at least [`TimedOptimum::lower`]. There are two deviations: the policy accepts a
+/// loss of at most a ten-thousandth to succeed earlier, and the process ignores the separation of
+/// happenings by ε.
 #[derive(Debug)]
 pub struct Policy {
     world: TimedWorld,
@@ -43,7 +44,7 @@ const CERTAINTY_TOLERANCE: f64 = 0.005;
 /// Difference of the bounds within which the policy counts as optimal.
 const OPTIMALITY_GAP: f64 = 0.02;
 
-/// Maximum probability that the policy trades for being earlier.
+/// Maximum loss of success probability that the policy accepts to succeed earlier.
 const EARLINESS_TOLERANCE: f64 = 1e-4;
 
 /// Default growth of the number of states when cells are halved: twice as many cells, with twice as
@@ -256,7 +257,7 @@ impl Policy {
         .with_values(settings, goes_on))
     }
 
-    /// Creates the policy without its values.
+    /// Creates the policy without the values of states.
     fn of(
         world: TimedWorld,
         chances: CellProbabilities,
@@ -370,7 +371,7 @@ impl Policy {
         self.world.spans_of(&values)
     }
 
-    /// Returns the events that are over for certain, or according to the observed changes.
+    /// Returns the events that are certainly over, or that observed changes show to be over.
     fn happened(&self, standing: &DecisionState<'_>) -> u32 {
         let now =
             (&self.step * &Rational::from(i64::try_from(standing.period).unwrap_or(0))).to_f64();

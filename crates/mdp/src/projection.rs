@@ -16,7 +16,7 @@ impl TimedWorld {
     /// the goal. `None` if there are none, or if fewer facts may be better.
     ///
     /// `chances` are those of this world for the upper bound, on a grid with [known
-    /// times](super::moments).
+    /// times](super::discrete_events).
     pub(super) fn without_certainties(&self, chances: &CellProbabilities) -> Option<Self> {
         if !self.is_monotone {
             return None;

@@ -36,7 +36,8 @@ impl Event {
     }
 }
 
-/// Returns the least upper bound on this grid and finer ones; 1 if none is finished.
+/// Returns the least of the upper bounds on this grid and finer ones; 1 if no bound could be
+/// computed.
 pub(super) fn bound_from(
     world: &TimedWorld,
     first_cells: usize,

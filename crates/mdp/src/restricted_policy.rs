@@ -2,10 +2,10 @@
 //! happenings.
 //!
 //! Such an agent is one of all executors, so its success probability is a lower bound for the best.
-//! The agent also starts every action that aborts no running action. Its process has far fewer
-//! states, because most running actions have the same start time. So its grids can be fine where
-//! those of the whole process have too many states. If the bound is close to 1, no upper bound is
-//! needed.
+//! The agent also starts every action whose start aborts no running action. Its process has far
+//! fewer states, because most running actions have the same start time. So its grids can be fine
+//! where those of the whole process have too many states. If the bound is close to 1, no upper
+//! bound is needed.
 
 use elbowroom_model::Task;
 use elbowroom_num::Rational;

@@ -174,8 +174,8 @@ impl State {
         after
     }
 
-    /// Returns the useful actions that can start. If starting one of them at once is always
-    /// optimal, returns only this one.
+    /// Returns the useful actions that can start; only one action if starting it at once is always
+    /// optimal.
     pub(super) fn startable(
         &self,
         world: &TimedWorld,

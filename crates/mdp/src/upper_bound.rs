@@ -1,6 +1,6 @@
 //! The upper bound: the agent knows the happenings of the present cell, and chooses their order. If
 //! everything happens at known times, states exist only at happenings
-//! ([`stretched`](super::moments)).
+//! ([`UpperBound::at_known_times`]).
 
 mod postponement;
 mod relaxed_ends;
@@ -74,8 +74,8 @@ impl<'a> UpperBound<'a> {
         }
     }
 
-    /// Creates the bound for worlds where everything happens at [known times](super::moments). In
-    /// it, happenings may be early by less than a cell.
+    /// Creates the bound for worlds where everything happens at [known
+    /// times](super::discrete_events). In it, happenings may be early by less than a cell.
     pub(super) fn at_known_times(world: &'a TimedWorld, chances: &'a CellProbabilities) -> Self {
         Self {
             end_classes: Some(EndClasses::new(world, chances)),
@@ -135,7 +135,7 @@ fn revealed(
     Ok(moments)
 }
 
-/// Splits each moment into the given ways, applying the change of each. If there are too many
+/// Splits each moment into these alternatives, applying the change of each. If there are too many
 /// moments already, they are not split.
 fn split<T>(
     moments: Vec<(f64, Moment)>,

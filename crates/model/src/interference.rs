@@ -198,7 +198,7 @@ impl Task {
         }
     }
 
-    /// Calls `visit` for each fluent that a condition reads, also through derived facts.
+    /// Calls `visit` for each fluent that a condition reads, including through derived facts.
     pub fn visit_fluents_of(&self, condition: &Condition, visit: &mut impl FnMut(FluentId)) {
         condition.visit_fluents(visit);
         let rules = self.rules();

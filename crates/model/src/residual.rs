@@ -1,4 +1,4 @@
-//! Remaining task of a situation during execution, as a task of its own.
+//! Remaining task of a situation during execution, as a separate task.
 
 use std::sync::Arc;
 

@@ -22,10 +22,10 @@ const CONSTRAINTS: &str = "trajectory constraints (`:constraints`)";
 ///
 /// Facts and fluents enter a table on first mention, so that a plan can be validated without
 /// grounding the whole problem. The table only grows, and clones share it, as do
-/// [`Task::starting_from`] and [`Situation::remaining_task`](crate::Situation::remaining_task): a fact
-/// has the same number in all of them. Numbers follow the order of first mention. If threads
-/// mention facts in no fixed order, each thread needs a table of its own ([`Task::with_own_table`])
-/// for reproducible results.
+/// [`Task::starting_from`] and [`Situation::remaining_task`](crate::Situation::remaining_task): a
+/// fact has the same number in all of them. Numbers follow the order of first mention. If threads
+/// mention facts in no fixed order, each thread needs its own table ([`Task::with_own_table`]) for
+/// reproducible results.
 #[derive(Clone, Debug)]
 pub struct Task {
     pub(crate) problem: Arc<Problem>,
@@ -235,7 +235,7 @@ impl Task {
     }
 
     /// Returns the task with a separate entry for each timed initial in [`timed`](Self::timed),
-    /// also for those at the same time.
+    /// including those at the same time.
     #[must_use]
     pub fn with_separate_timed_initials(&self) -> Self {
         let mut task = self.clone();
@@ -273,8 +273,8 @@ impl Task {
         task
     }
 
-    /// Returns the task with a table of its own. Numbers of facts and fluents that are mentioned
-    /// from now on are not valid for other tasks.
+    /// Returns the task with its own table. Numbers of facts and fluents that are mentioned from
+    /// now on are not valid for other tasks.
     #[must_use]
     pub fn with_own_table(&self) -> Self {
         Self {

@@ -103,13 +103,14 @@ pub struct Settings {
     /// Tamer agree), and networks, envelopes, planner and executors rely on it. Otherwise, the goal
     /// is read after the last happening of the plan's actions.
     pub counts_later_timed: bool,
-    /// Allows happenings of one time to change facts and numbers that others of that time read. All conditions
-    /// read the state before. Contradictory writes are refused by
-    /// [`refuses_equal_writes`](Self::refuses_equal_writes). This is the rule of unified-planning for problems
-    /// without an ε.
+    /// Allows simultaneous happenings to change facts and numbers that other happenings of the same
+    /// time read. All conditions read the state before these happenings.
+    /// [`refuses_equal_writes`](Self::refuses_equal_writes) rejects contradictory writes. This is
+    /// the rule of unified-planning for problems without an ε.
     pub allows_simultaneous_reads: bool,
-    /// Refuses that two steps, or a step and a timed initial, write the same fact at one time, even the same
-    /// value. This is the rule of unified-planning; PDDL 2.1 allows equal writes.
+    /// Rejects plans in which two steps, or a step and a timed initial, write the same fact at the
+    /// same time, even the same value. This is the rule of unified-planning; PDDL 2.1 allows equal
+    /// writes.
     pub refuses_equal_writes: bool,
 }
 

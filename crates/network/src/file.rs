@@ -88,7 +88,7 @@ pub struct Correlation {
 pub struct GivenWait {
     /// The time point that waits.
     pub node: NodeId,
-    /// The link whose end it waits for.
+    /// The link whose end the time point waits for.
     pub link: LinkId,
     /// Longest wait; `None` if only the link's end can end it.
     pub delay: Option<Rational>,

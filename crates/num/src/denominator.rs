@@ -26,8 +26,8 @@ impl Default for CommonDenominator {
 }
 
 impl CommonDenominator {
-    /// Returns the least common denominator of these numbers; `None` if it does not fit an `i64`,
-    /// or one of them does not.
+    /// Returns the least common denominator of these numbers; `None` if it, or one of the numbers,
+    /// does not fit an `i64`.
     pub fn of<'a>(numbers: impl IntoIterator<Item = &'a Rational>) -> Option<Self> {
         let mut common = Self::default();
         for number in numbers {
@@ -46,8 +46,8 @@ impl CommonDenominator {
         Some(())
     }
 
-    /// Returns the number multiplied by the denominator; `None` if that is no whole number, or does
-    /// not fit an `i64`.
+    /// Returns the number multiplied by the denominator; `None` if that is not a whole number, or
+    /// does not fit an `i64`.
     pub fn to_integer(self, number: &Rational) -> Option<i64> {
         let (numerator, own) = number.as_small()?;
         (self.0 % own == 0).then(|| numerator.checked_mul(self.0 / own))?

@@ -24,9 +24,9 @@ const MAX_POINTS: usize = 20_000;
 pub(crate) struct StateTimeline<'t> {
     task: &'t Arc<Task>,
     progression: BeliefState,
-    /// Facts at the last call of [`Belief::note`].
+    /// Facts at the last call of [`record_changes`](Self::record_changes).
     facts: Vec<bool>,
-    /// Values at the last call of [`Belief::note`], by fluent.
+    /// Values at the last call of [`record_changes`](Self::record_changes), by fluent.
     values: Vec<Option<Rational>>,
     /// The changes so far.
     changes: Vec<Change>,

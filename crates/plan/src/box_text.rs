@@ -15,7 +15,7 @@ const MOST_LISTED: usize = 12;
 /// Errors of a text that is not a box of this plan's parameters.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BoxTextError {
-    /// An item is not a name with an interval.
+    /// An item does not have the form of a name with an interval.
     #[error(
         "`{text}` is not an interval: write NAME=[LOWER,UPPER], NAME=VALUE or NAME=±10%, such as \
          dur_0=[1/2,7.5], dur_0=[0,inf] or all=±10%"
@@ -51,7 +51,7 @@ pub enum BoxTextError {
         /// Its name.
         name: String,
     },
-    /// An interval holds no number.
+    /// An interval contains no number.
     #[error("the interval of `{name}` is empty: its lower end is above its upper end")]
     Empty {
         /// Its name.

@@ -65,8 +65,8 @@ pub struct Deordered {
     pub plan: StnPlan,
     /// For each step of the original plan, its instance.
     pub instances: Vec<InstanceId>,
-    /// The times of the original plan. If they do not satisfy the constraints, because they were
-    /// rounded, times close to them that do.
+    /// The times of the original plan. If rounding has made them violate the constraints, these are
+    /// close times that satisfy the constraints.
     pub nominal: Schedule,
 }
 

@@ -29,8 +29,8 @@ pub fn last_end(plan: &TimeTriggeredPlan) -> Rational {
 }
 
 /// Returns the network of the schedules where the durations that the executor chooses are as
-/// planned ([`ParametrizedPlan::told`]). If there is no such schedule, it is the network of all
-/// schedules; `None` if there are none at all.
+/// planned ([`ParametrizedPlan::with_planned_durations`]). If there is no such schedule, it is the
+/// network of all schedules; `None` if there are none at all.
 ///
 /// A plan that works only for other durations has at most the weak guarantee.
 pub fn with_fixed_choices(plan: &ParametrizedPlan, network: Network) -> Option<ConsistentNetwork> {

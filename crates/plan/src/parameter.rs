@@ -86,7 +86,7 @@ impl ParametrizedPlan {
         }
     }
 
-    /// Returns the instances whose durations are parameters, also if one parameter is the duration
+    /// Returns the instances whose durations are parameters, even if one parameter is the duration
     /// of several.
     pub fn open_durations(&self) -> impl Iterator<Item = (InstanceId, ParameterId)> + '_ {
         let constraints = self.plan.constraints.iter();

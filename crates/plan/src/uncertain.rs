@@ -13,7 +13,7 @@ use crate::valuation::ParameterId;
 /// Interpretation of a plan's constraint for an executor: a requirement or a contingent link.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ConstraintRole {
-    /// The executor has to satisfy `lower <= to - from <= upper`; `None` is no bound.
+    /// The executor has to satisfy `lower <= to - from <= upper`; `None` means no bound.
     Requirement {
         /// Least difference.
         lower: Option<Rational>,

@@ -73,7 +73,7 @@ pub struct FactContribution {
 }
 
 impl LossAnalysis {
-    /// Computes the account of an order.
+    /// Computes the analysis of an order.
     ///
     /// # Errors
     /// When a condition couples too many uncertain facts.

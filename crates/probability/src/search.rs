@@ -413,7 +413,7 @@ impl OrderSearch {
         timed.take_while(|(_, time)| time <= now).count()
     }
 
-    /// Returns the rests of an order from a position on, after `passed` timed initials.
+    /// Returns the suffixes of an order from a position on, after `passed` timed initials.
     pub(crate) fn suffixes(&self, order: &TotalOrderPlan, from: usize, passed: usize) -> Suffixes {
         let running = order.layers.last().map_or(&[][..], |layer| &layer.running);
         let sequence = &order.sequence[..];

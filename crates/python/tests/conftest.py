@@ -1,4 +1,4 @@
-"""What the tests share: the cases of the repository."""
+"""Shared data of the tests: the cases of the repository."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def plan() -> Path:
 
 
 def names() -> dict[str, Any]:
-    """What the examples in docstrings use."""
+    """Names that the examples in docstrings use."""
     domain = (DELIVERY / "domain.pddl").read_text()
     text = (DELIVERY / "problem.pddl").read_text()
     return {

@@ -1,4 +1,4 @@
-"""Counts what becomes of plans on their way through unified-planning.
+"""Counts the results of converting plans to unified-planning and back.
 
     python crates/python/tests/round_trip.py DATA
 
@@ -36,7 +36,7 @@ def ring(*_: Any) -> None:
 
 
 def outcome(domain: Path, problem: Path, plan: Path) -> tuple[str, str]:
-    """What became of one plan, and details."""
+    """Result of one plan, with details."""
     try:
         read = elbowroom.read(domain, problem)
         steps = read.read_plan(plan).steps

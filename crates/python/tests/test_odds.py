@@ -1,4 +1,4 @@
-"""How likely a plan is to succeed."""
+"""Success probabilities of plans."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ def solved(problem: Any, **params: Any) -> Any:
 
 
 def verdicts(problem: Any, plan: Any) -> tuple[bool, bool]:
-    """What the engine's validator and unified-planning's own say of a plan."""
+    """Returns the verdicts of the engine's validator and of unified-planning's own."""
     with PlanValidator(name="elbowroom-val") as own, PlanValidator(name="up_time_triggered_validator") as their:
         return bool(own.validate(problem, plan)), bool(their.validate(problem, plan))
 
@@ -340,7 +340,7 @@ def test_random_problems_are_answered_by_unified_plannings_rules() -> None:
 
 
 def judged_in_order(problem: Any, actions: list[Any]) -> tuple[bool, bool]:
-    """What both validators say of a plan without times."""
+    """Returns the verdicts of both validators on a plan without times."""
     plan = SequentialPlan([ActionInstance(action) for action in actions])
     with PlanValidator(name="elbowroom-val") as own, SequentialPlanValidator() as their:
         return bool(own.validate(problem, plan)), bool(their.validate(problem, plan))

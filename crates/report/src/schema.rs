@@ -227,7 +227,7 @@ pub struct ReasonLine {
     /// Time since which the reason has existed.
     pub since: Option<Exact>,
     /// Remaining guarantee of the plan, if the executor gives guarantees:
-    /// [`Promise::name`](elbowroom_execution::GuaranteeLevel::name).
+    /// [`GuaranteeLevel::name`](elbowroom_execution::GuaranteeLevel::name).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub promise: Option<String>,
 }

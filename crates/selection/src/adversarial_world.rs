@@ -15,7 +15,8 @@ use elbowroom_stn::uncertain::{Adversary, UncertainNetwork};
 /// actions end.
 ///
 /// Actions outside the plan, and durations that the box does not leave open, are as planned. Every
-/// action ends by its time-out. Without time-outs, an action whose interval is infinite ends late.
+/// action ends by its time-out. If time-outs are off, an action with an infinite interval ends
+/// after a long but finite time.
 #[derive(Clone, Debug)]
 pub struct AdversarialWorld {
     spoiler: Adversary,
@@ -28,7 +29,7 @@ pub struct AdversarialWorld {
     timed: Vec<(NodeId, Rational)>,
     /// The running actions.
     running: BTreeMap<ActionHandle, InstanceId>,
-    /// End times of the actions that the spoiler does not control.
+    /// End times of the actions that the adversary does not control.
     ends: BTreeMap<ActionHandle, Rational>,
 }
 

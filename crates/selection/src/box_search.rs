@@ -59,7 +59,7 @@ pub struct Search {
     pub relative: Option<Rational>,
     /// Change of step sizes after a success.
     pub growth: Growth,
-    /// `true` if each end is moved onto its limit after the search.
+    /// `true` to move each end exactly onto its limit after the search.
     pub sharpen: bool,
     /// Maximum number of box checks.
     pub most_checks: Option<usize>,
@@ -160,7 +160,7 @@ pub enum BoxSearchError {
 
 /// A step of the search.
 pub enum Step<'a> {
-    /// IRR has tried to move an end; the widening if it did.
+    /// IRR has tried to move an end. Contains the widening if it was moved.
     Irr(Option<&'a Widening<'a>>),
     /// A step of the search for the best box.
     Best(&'a BestStep<'a>),

@@ -79,7 +79,7 @@ impl<P: Planner> Planner for CachingPlanner<P> {
     fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
         let table = table_size(task);
         if *self.table_size.get_or_insert(table) != table {
-            // Facts that were numbered later may differ between runs.
+            // Facts that are numbered later may get different numbers in each run.
             return self.planner.plan(task, situation);
         }
         let hash = hash(&(&situation.time, parts(&situation.state)));

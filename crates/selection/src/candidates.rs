@@ -12,7 +12,7 @@
 //! 4. actions that rarely fail, with a world;
 //! 5. the problem without an action of a plan found before, recursively.
 //!
-//! The validator has accepted each plan for the problem as it is, whatever variant it was made for.
+//! The validator has accepted each plan for the original problem, whatever variant it was made for.
 //! No two plans have the same actions in the same order. The source uses no clock and no random
 //! seed: the same problem, world and limits give the same plans.
 
@@ -222,8 +222,9 @@ impl<'a> Candidates<'a> {
                 .max(VARIANT_STATES_FACTOR.saturating_mul(first))
                 .min(left);
             if variant.scarcity.is_some() {
-                // The first plan found may compensate small amounts in a wasteful way; a better one
-                // does so in time.
+                // The first plan may compensate for small amounts with many additional actions. A
+                // shorter one may follow, so all of these states are also available for a better
+                // plan.
                 (left / SCARCE_STATES_DIVISOR, left / SCARCE_STATES_DIVISOR)
             } else {
                 (most, most.min(self.limits.improve_states))

@@ -15,7 +15,7 @@ pub enum DistributionError {
          one, or choose another objective"
     )]
     NoWorld,
-    /// A parameter is no duration.
+    /// A parameter is not a duration.
     #[error(
         "the objective `probability` supports durations only, not {0}; do not vary it, or choose \
          another objective"
@@ -40,7 +40,7 @@ pub enum DistributionError {
 /// (delays, failures, events) are ignored.
 ///
 /// # Errors
-/// When a parameter is no duration, or no best box can be proved for its distribution.
+/// When a parameter is not a duration, or no best box can be proved for its distribution.
 pub fn duration_distributions(
     plan: &ParametrizedPlan,
     world: &WorldModel,

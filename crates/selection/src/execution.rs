@@ -239,7 +239,8 @@ impl<'a> Execution<'a> {
         Self { foresight, ..self }
     }
 
-    /// Sets the odds, for executors that search for likelier plans ([`ExecutorSpec::needs_comparator`]).
+    /// Sets the comparator of plans, for executors that search for likelier plans
+    /// ([`ExecutorSpec::needs_comparator`]).
     pub fn with_plan_comparator(self, odds: Option<Box<dyn PlanComparator>>) -> Self {
         Self {
             plan_comparator: odds,
@@ -247,7 +248,8 @@ impl<'a> Execution<'a> {
         }
     }
 
-    /// Sets the outlook, for executors that evaluate each move ([`ExecutorSpec::needs_action_values`]).
+    /// Sets the table of action values, for executors that evaluate each move
+    /// ([`ExecutorSpec::needs_action_values`]).
     pub fn with_action_values(self, outlook: Option<Arc<dyn ActionValues>>) -> Self {
         Self {
             action_values: outlook,
@@ -255,7 +257,7 @@ impl<'a> Execution<'a> {
         }
     }
 
-    /// Records the reason for a missing outlook of an executor that evaluates each move.
+    /// Records why an executor that evaluates each move has no table of action values.
     pub fn with_missing_table_reason(self, no_table: Option<String>) -> Self {
         Self {
             missing_table_reason: no_table,
@@ -269,7 +271,7 @@ impl<'a> Execution<'a> {
         self.missing_table_reason.as_deref()
     }
 
-    /// Sets the rollouts, for executors that evaluate each move without an outlook.
+    /// Sets the rollouts, for executors that evaluate each move without a table of action values.
     pub fn with_rollouts<R: RunRollouts + 'a>(self, rollouts: Option<R>) -> Self {
         Self {
             rollouts: rollouts.map(|it| Box::new(it) as Box<dyn RunRollouts + 'a>),

@@ -66,7 +66,7 @@ impl External<'_> {
         )
     }
 
-    /// Returns the answer. `before` is the duration of an earlier attempt.
+    /// Converts the outcome to an answer. `before` is the duration of an earlier attempt.
     fn answer(&self, report: Report, before: Duration) -> PlannerAnswer {
         let name = &self.planner.name;
         let mut remark = None;

@@ -31,9 +31,9 @@ fn open_durations(plan: &StnPlan) -> BTreeSet<InstanceId> {
 ///
 /// Planners choose them as short or as long as the domain and the goal permit, so that the smallest
 /// deviation breaks the plan. Every value in the envelope has the same guarantee as the planned
-/// one. However, the envelope permits more than the domain's bounds on durations, which may read
-/// values that another duration changes. So nothing is changed unless the plan `given`, which has
-/// these bounds, is valid with all values.
+/// one. However, the envelope may permit durations outside the domain's bounds, which may depend on
+/// values that another duration changes. So no duration is changed unless the plan `given`, which
+/// includes these bounds, is valid with all new values.
 pub(super) fn choose(
     task: &Task,
     given: &StnPlan,

@@ -105,7 +105,8 @@ impl PlanPreparer {
         pipeline::open(task, freed, &specs).map_err(preparation_error)
     }
 
-    /// Returns the orderings that facts require: see [`Need::Orderings`].
+    /// Returns the orderings that facts require: see
+    /// [`PlanForm::Orderings`](elbowroom_execution::PlanForm::Orderings).
     fn orderings(
         task: &Task,
         plan: &TimeTriggeredPlan,
@@ -335,7 +336,7 @@ impl RegionOracle for ExactRegion {
         Some(explainer.objection(&oracle, &envelope, &objection).reason)
     }
 
-    /// Runs IRR nearby and in small steps.
+    /// Runs IRR with a small initial step, so that it stays near the values.
     fn surroundings(
         &mut self,
         task: &Arc<Task>,

@@ -176,7 +176,7 @@ pub struct PlanSelector<'a> {
     pub improve_states: u64,
     /// Work limit of the choice, in units of [`elbowroom_num::work`]. If it is spent, the plan is
     /// the best so far. The search for a first plan may take
-    /// [`PATIENCE`](super::Embedded::first_plan_factor) times as much.
+    /// [`first_plan_factor`](super::Embedded::first_plan_factor) times as much.
     pub work: u64,
     /// Knowledge of the world.
     pub knowledge: WorldKnowledge,

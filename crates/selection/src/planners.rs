@@ -137,7 +137,7 @@ pub(crate) fn without_plan(
     PlanAnswer::NotFound { why }
 }
 
-/// The default limit on the work for one plan, in seconds of one processor.
+/// The default planning budget: the limit on the work for one plan, in seconds of one processor.
 pub const PLANNING_BUDGET: i64 = 2;
 
 /// Converts a planning budget in seconds of one processor to units of [`elbowroom_num::work`]:
@@ -149,12 +149,12 @@ pub fn planning_work(seconds: &Rational) -> u64 {
     })
 }
 
-/// See [`Embedded::patience`].
+/// See [`Embedded::first_plan_factor`].
 pub(crate) const FIRST_PLAN_FACTOR: u64 = 4;
 
 /// Returns the reason why the embedded planner has no plan after a search of at most `most_states` states.
 ///
-/// The second member of `counts` is `true` if plans were excluded with self-overlap.
+/// The second member of `counts` is `true` if plans with self-overlap were excluded.
 fn no_plan_reason(stopped: Stopped, counts: (Counts, bool), most_states: u64) -> String {
     match stopped {
         Stopped::Exhausted => exhausted(counts.0, counts.1),

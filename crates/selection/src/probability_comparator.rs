@@ -176,7 +176,7 @@ impl<'a> MostProbablePlanner<'a> {
         for schema in (0..problem.schemas.len()).map(SchemaId::from) {
             let values = RefCell::new(&mut *self);
             set_durations(task, schema, &mut problem, &|name, planned| {
-                // A plan with shorter durations than planned is no plan of the task.
+                // A plan with shorter durations than planned is not a plan of the task.
                 let slow = values.borrow_mut().quantile(name, planned, quantile);
                 slow.max(planned.clone())
             });

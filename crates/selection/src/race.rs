@@ -27,8 +27,8 @@ impl Tally {
         is_behind(&self.results, &other.results)
     }
 
-    /// Returns `true` if it may still be ahead of `other` by one sample in `margin`, within the
-    /// error of the samples.
+    /// Returns `true` if this plan's true lead over `other` may be one sample in `margin`, within
+    /// the statistical error of the samples.
     fn may_be_ahead(&self, other: &Self, margin: u64) -> bool {
         let (own, theirs) = differences(&self.results, &other.results);
         let least = self.samples().min(other.samples()) / margin;

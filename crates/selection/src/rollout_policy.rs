@@ -49,8 +49,9 @@ const NEW_PLAN_ROUNDS: [u64; 6] = [50, 100, 200, 400, 800, 1600];
 /// sampled.
 const FIRST_SAMPLES: u64 = 25;
 
-/// Number of these samples that may fail without a comparison of alternatives: if no action has
-/// failed, and if one has failed but the plan is not to be abandoned.
+/// Number of these samples that may fail before alternatives are compared. The first number applies
+/// if no action has failed, the second one if an action has failed and the executor does not
+/// abandon the plan.
 const TOLERATED_WITHOUT_DEVIATION: usize = 2;
 const TOLERATED_AFTER_FAILURE: usize = 1;
 
@@ -92,7 +93,7 @@ pub struct RolloutPolicy {
     preparer: CachingPreparer<PlanPreparer>,
     /// Preparer of plans in samples, with a quickly computed envelope.
     sample_preparer: CachingPreparer<PlanPreparer>,
-    /// The best plan for a situation, until the planner is called for it.
+    /// The best plan for a situation, kept until the planner port is called for this situation.
     chosen: Option<(Situation, TimeTriggeredPlan)>,
     /// Results for the beginnings of runs, by plan.
     initial_results: Vec<(TimeTriggeredPlan, Choice)>,

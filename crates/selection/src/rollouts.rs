@@ -103,7 +103,7 @@ impl<'a> RolloutSession<'a> {
         {
             rollouts.executor = live;
         }
-        // Measured planning times are not known in advance.
+        // A measured planning time is not known in advance.
         if rollouts.settings.planning_time == PlanningTime::Measured {
             rollouts.settings.planning_time = PlanningTime::Seconds(Rational::ZERO);
         }

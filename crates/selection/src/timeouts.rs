@@ -6,7 +6,7 @@ use elbowroom_num::Rational;
 use elbowroom_plan::{Bound, ParametrizedPlan};
 
 /// Returns, for each parameter, the time-out of the action whose duration it is, or `None` if it is
-/// no duration, or if time-outs are off.
+/// not a duration, or if time-outs are off.
 pub fn timeouts(plan: &ParametrizedPlan, rule: &TimeoutRule) -> Vec<Option<Rational>> {
     let mut timeouts = vec![None; plan.parameters.len()];
     for (instance, id) in plan.open_durations() {
@@ -16,7 +16,7 @@ pub fn timeouts(plan: &ParametrizedPlan, rule: &TimeoutRule) -> Vec<Option<Ratio
     timeouts
 }
 
-/// Returns the mistake, for users, if a rule is about an action that the problem does not have.
+/// Returns an error message for users if a rule names an action that the problem does not have.
 pub fn unknown_action(rule: &TimeoutRule, problem: &Problem) -> Option<String> {
     let is_known = |name: &str| {
         let inner = name

@@ -112,7 +112,7 @@ impl<W: Weight> ConsistentNetwork<W> {
     /// Takes time in proportion to the nodes that the constraint moves (Cotton & Maler, SAT 2006).
     ///
     /// # Errors
-    /// A cycle of negative length. Its first constraint is the refused one, with the identifier
+    /// A cycle of negative length. Its first constraint is the rejected one, with the identifier
     /// that it would have received.
     pub fn add(&mut self, constraint: Constraint<W>) -> Result<ConstraintId, NegativeCycle<W>> {
         let before = self.checkpoint();

@@ -10,7 +10,7 @@
 //! consistent. That schedule makes all queries cheap, because it turns all edges non-negative for
 //! Dijkstra's algorithm:
 //!
-//! - [`ConsistentNetwork::add`] adds a constraint, or refuses it with a proof;
+//! - [`ConsistentNetwork::add`] adds a constraint, or rejects it with a proof;
 //!   [`ConsistentNetwork::undo_to`] removes constraints;
 //! - [`ConsistentNetwork::windows`], [`ConsistentNetwork::earliest_schedule`],
 //!   [`ConsistentNetwork::latest_schedule`]: the earliest and latest times of each point;

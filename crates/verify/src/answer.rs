@@ -189,7 +189,7 @@ fn are_decimals_right(value: &Value) -> bool {
 /// Returns the ε of an answer, if it has one.
 ///
 /// # Errors
-/// When the text is no answer of `elbowroom envelope`.
+/// When the text is not an answer of `elbowroom envelope`.
 pub fn epsilon_of(text: &str) -> Result<Option<Rational>, AnswerError> {
     let any: AnyAnswer = serde_json::from_str(text)?;
     Ok(any.settings.epsilon.map(|epsilon| epsilon.exact))

@@ -16,8 +16,8 @@
 //!   before the action, after it, or inside it in a fixed order; or the condition is a fact that is
 //!   established before the action, and changed only before that point or after the action; or the condition
 //!   cannot fail at any moment inside the action, for each set of writers that can come before that moment.
-//! - The points that change facts in constraints on the course of the plan keep their order and, where the constraint
-//!   has times, their bounds ([`Course`]).
+//! - The points that change facts in constraints on the course of the plan keep their order and,
+//!   where the constraint has times, their bounds ([`TrajectoryDerivation`]).
 //! - Durations are parameters, or those that the domain allows. Timed initials happen at their times. Initial
 //!   values are parameters or those of the problem.
 //!
@@ -294,7 +294,7 @@ fn is_not_narrower(
 
 /// The part of a certificate's subject that its answer is compared with.
 pub(crate) struct Derived {
-    /// The quantity of each parameter that is no initial value.
+    /// The quantity of each parameter that is not an initial value.
     pub(crate) quantities: Vec<Quantity>,
     /// The label of each parameter, by position.
     pub(crate) labels: BTreeMap<usize, Label>,

@@ -39,8 +39,8 @@ pub(crate) fn duration(
 }
 
 /// Checks that constraints refer to existing points, and that observed constraints are durations:
-/// each ends at a point of its own, not at time zero, and they form no cycle. The theorems about
-/// such networks assume these properties.
+/// each ends at a separate point, not at time zero, and they form no cycle. The theorems about such
+/// networks assume these properties.
 ///
 /// # Errors
 /// The first constraint that violates them.

@@ -10,9 +10,9 @@
 //!   is not later.
 //! - If the conditions of an action instance are true no earlier than listed, all facts that the
 //!   instance adds are listed, with times that are not later.
-//! - The goal needs a fact that is not listed, or that timed initials delete for good.
+//! - The goal needs a fact that is not listed, or that timed initials delete permanently.
 //!
-//! So in no execution there is a first fact that violates the list. The check of an action's start
+//! So no execution contains a first fact that violates the list. The check of an action's start
 //! considers only conditions that the action reads at its start, and facts that only timed initials
 //! make true: other actions that start at the same time may establish the later conditions. The
 //! check of its end considers all conditions.

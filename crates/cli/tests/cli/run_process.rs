@@ -301,7 +301,7 @@ fn output_of_world_is_escaped_and_wrapped() {
     fs::remove_file(trace).expect("the trace is there");
 }
 
-/// The document of a run contains the executed actions, also if the world failed.
+/// The document of a run contains the executed actions, even if the world failed.
 #[test]
 fn a_run_whose_world_fails_leaves_its_document() {
     let file = temporary("dies");

@@ -279,7 +279,7 @@ fn run(job: &Job, options: &Options) -> Row {
     filled(row, &report)
 }
 
-/// Returns the planner of that name; the embedded one as a process of its own.
+/// Returns the planner of that name; the embedded one as a separate process.
 fn planner(name: &str) -> Result<Planner, String> {
     if name != "embedded" {
         return Planner::named(name).map_err(|error| error.to_string());

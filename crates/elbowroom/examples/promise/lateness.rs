@@ -42,8 +42,8 @@ pub(crate) fn excuses(
 
 /// Returns `true` if an end or a timed initial has come before the late start although the plan
 /// puts it after that start, and the failed action is the late one or one that ends after it. If
-/// the executor itself started an action too early, the late start is no excuse, unless the plan
-/// puts that action after the late start only because of such an end.
+/// the executor itself started an action too early, the late start is not an excuse, unless the
+/// plan puts that action after the late start only because of such an end.
 fn is_overtaken(
     task: &Task,
     prepared: &PreparationResult,

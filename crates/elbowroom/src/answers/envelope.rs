@@ -336,7 +336,7 @@ impl Subject<'_> {
         }
     }
 
-    /// Rejects an objection that is no proof of failure: processes and events would take another
+    /// Rejects an objection that does not prove a failure: processes and events would take another
     /// course than in the plan, which may be harmless.
     fn reject_unproved_objection(
         &self,

@@ -37,9 +37,9 @@ pub struct RepairRequest {
     /// The name of the plan in the answer, such as its file.
     pub name: String,
     /// Quantities that may change. The weight is the cost per unit of change; values stay inside
-    /// the range. If empty: fixed durations, durations beyond what the domain allows (weight 2),
-    /// times of timed initials, and the parameters and bounds of an STN plan file (weight 1; lower
-    /// bounds 10).
+    /// the range. If empty, these may change: durations, also beyond the domain's limits (weight
+    /// 2); times of timed initials (weight 1); and the parameters and bounds of an STN plan file
+    /// (weight 1, lower bounds 10).
     pub change: Vec<VarySpec>,
     /// Exceptions from `change`: quantities that may not change.
     pub keep: Vec<VarySpec>,

@@ -84,7 +84,7 @@ fn agrees(case: &str, intervals: &[&str], region: impl Fn(&[Rational]) -> bool) 
         let found = alone(&task, &plan, instance).to_string();
         assert_eq!(found, *expected, "{case}: duration n{instance}");
     }
-    // All durations, also those that the domain leaves to the executor.
+    // All durations, including those that the domain leaves to the executor.
     let opened = Arc::new(opened(&task, &plan, &["durations"]));
     let nominal: Vec<Rational> = opened.nominal().into_iter().collect();
     assert!(region(&nominal), "{case}: the nominal point");

@@ -432,7 +432,7 @@ fn undone_effects_are_not_spontaneous_changes() {
 }
 
 /// With the true rates, the number of observed changes is as expected. With other rates the answer
-/// reports the difference, also for facts that never changed.
+/// reports the difference, including facts that never changed.
 #[test]
 fn expected_and_observed_changes_are_both_reported() {
     let world = format!(

@@ -1,7 +1,8 @@
 //! Permitted dependencies between the crates of the workspace.
 //!
-//! A program of its own, with the other tests that only read files: it is compiled in seconds, and `cargo build
-//! --workspace --bin elbowroom --test layers` builds the command with the features of dependencies that tests use.
+//! A separate program, with the other tests that only read files: it is compiled in seconds, and
+//! `cargo build --workspace --bin elbowroom --test layers` builds the command with the features of
+//! dependencies that tests use.
 //!
 //! Cargo forbids cyclic dependencies, but does not check layers; this table does. The code map of
 //! ARCHITECTURE.md has the same list. Change both together, and give the reason there.

@@ -1,4 +1,4 @@
-//! Cyclic dependencies between modules of a crate, and of a binary in a folder of its own.
+//! Cyclic dependencies between modules of a crate, and of a binary in a separate folder.
 //!
 //! Rust permits cycles inside a crate. The modules of a cycle cannot be understood, tested or moved
 //! separately, so each cycle among a crate's top-level modules must be listed here with its reason.

@@ -18,7 +18,7 @@ use crate::obligations::Refusal;
 use crate::oracle::Oracle;
 use crate::row::Row;
 
-/// Number of halvings of each end when a refused box is shrunk because no linear cut is known.
+/// Number of halvings of each end when a rejected box is shrunk because no linear cut is known.
 const HALVINGS: usize = 16;
 /// Limit on boxes that are shrunk before the search stops with its current result.
 const MAX_SHRUNK: usize = 24;
@@ -349,7 +349,7 @@ impl Search<'_> {
         cut.rows.iter().any(holds)
     }
 
-    /// Searches for a better box between the nominal values and one that was refused.
+    /// Searches for a better box between the nominal values and one that was rejected.
     fn improve(&mut self, values: &[Rational]) -> Result<(), Refusal> {
         let mut ray = LineSearch::new(self.plan);
         for (ends, value) in self.variables.ends.iter().zip(values) {
@@ -375,8 +375,8 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Shrinks a refused box as far as possible, and returns the cut that one of its ends has to be
-    /// nearer. Used if no linear cut is known. `None` after too many of them.
+    /// Shrinks a rejected box as far as possible, and returns the cut that one of its ends has to
+    /// be nearer. Used if no linear cut is known. `None` after too many of them.
     fn shrink(&mut self, refused: &DecoupledEnvelope) -> Result<Option<Cut>, Refusal> {
         self.shrunk += 1;
         if self.shrunk > MAX_SHRUNK {

@@ -2,8 +2,8 @@
 //!
 //! The logarithm of the probability is a sum over the parameters. Each term is a jointly concave
 //! function of the ends of an interval if the logarithm of the density is concave (Prékopa 1973),
-//! so it lies below its tangents, like the logarithm of a volume. Values with a probability of
-//! their own (at cuts, and measured values) are either inside or outside. A case counts such a
+//! so it lies below its tangents, like the logarithm of a volume. Values with a positive
+//! probability (at cuts, and measured values) are either inside or outside. A case counts such a
 //! probability proportionally to the distance, and is split if that is too imprecise. The numbers
 //! are those of [`elbowroom_num::chance`].
 

@@ -71,7 +71,7 @@ impl Volume {
         }
     }
 
-    /// Returns the widths relative to their scales, each with the constant [`foot`] added.
+    /// Returns the widths relative to their scales, each with the constant [`width_offset`] added.
     fn offset_widths<'a>(&'a self, values: &'a [Rational]) -> impl Iterator<Item = Rational> + 'a {
         self.widths.iter().map(|width| {
             let own = width.variables.iter();
@@ -130,7 +130,7 @@ impl Volume {
             let values = shorten_digits(values, master, variables, case, &|own| {
                 self.lower_value(own)
             });
-            // Fills the room that rounding has left, and moves variables that do not change the
+            // Uses the slack that rounding has left, and moves variables that do not change the
             // objective.
             let filled = master.best_within(case, (Side::Lower, &values), &worths);
             filled.unwrap_or(values)

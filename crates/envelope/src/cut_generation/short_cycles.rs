@@ -1,7 +1,7 @@
 //! From a long conflict to shorter ones: [`Shortcuts`].
 //!
 //! Windows and deadlines bind time points to the beginning. A cycle along many of them is one
-//! conflict, the most violated one, and says little about narrower boxes: these are refused by
+//! conflict, the most violated one, and says little about narrower boxes: these are rejected by
 //! slightly shorter cycles, one after the other. Divided at the points that are bound to the
 //! beginning, the cycle yields short ones, which have fewer ends and often imply it.
 

@@ -1,10 +1,10 @@
-//! Batched steps of the search: [`Ahead`].
+//! Batched steps of the search: [`Speculation`].
 //!
 //! If a box is inside the envelope, so are all boxes inside it. So a sequence of widenings that
 //! were assumed to succeed is correct if the last box is inside, and one check is enough for all of
-//! them. The reason that refuses a box also refuses others ([`Cut`](crate::Cut)), so steps that a
-//! known reason refuses need no check either. The resulting steps are those of one check after the
-//! other.
+//! them. The reason for rejecting a box also applies to others ([`Cut`](crate::Cut)), so steps that
+//! a known reason excludes need no check either. The resulting steps are those of one check after
+//! the other.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -180,7 +180,7 @@ impl<'a> Speculation<'a> {
         }
     }
 
-    /// Discards a leap whose box was refused, and records the cuts.
+    /// Discards a leap whose box was rejected, and records the cuts.
     fn discard(&mut self, cuts: Vec<Cut>) {
         self.cut_pool.rollback();
         if let Some(pieces) = &mut self.conflict_split {
@@ -193,7 +193,7 @@ impl<'a> Speculation<'a> {
         }
     }
 
-    /// Takes steps that nothing known refuses, without checks.
+    /// Takes steps that no known reason rejects, without checks.
     fn speculate(&mut self) -> SpeculativeSteps {
         let plan = Arc::clone(&self.plan);
         let mut leap = SpeculativeSteps {
@@ -256,7 +256,7 @@ impl<'a> Speculation<'a> {
         Some(Reach(Some(reach)))
     }
 
-    /// Returns `true` if the box with that end moved is known to be refused.
+    /// Returns `true` if the box with that end moved is known to be rejected.
     fn is_refused(&self, end: BoxEnd, from: &Rational, to: Option<&Rational>) -> bool {
         let is_too_far = match &self.bounds {
             Some(bounds) => bounds.exclude(end, to),
@@ -308,7 +308,7 @@ impl<'a> Speculation<'a> {
         ControlFlow::Continue(())
     }
 
-    /// Takes one step with a check of its own.
+    /// Takes one step with a separate check.
     fn step(
         &mut self,
         on_step: &mut dyn FnMut(Option<&Widening<'_>>) -> ControlFlow<()>,
@@ -347,7 +347,7 @@ impl<'a> Speculation<'a> {
     }
 
     /// Returns `true` if the box with an end moved out is inside the envelope. An undecided box
-    /// counts as refused.
+    /// counts as rejected.
     fn is_inside(&mut self, end: BoxEnd, reach: Option<Rational>) -> bool {
         self.checks += 1;
         let answer: Result<bool, Refusal> = self.oracle.try_reach(end, reach);

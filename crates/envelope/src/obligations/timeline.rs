@@ -262,7 +262,8 @@ impl Reading<'_> {
         derivation.with_derived_facts(&basic, derived).fact(fact)
     }
 
-    /// Returns the expression's value at the cut and moment; `None` if it is undefined.
+    /// Returns the value of the expression at this position of the timeline; `None` if it is
+    /// undefined.
     pub(crate) fn linear(&self, expression: &Expression) -> Result<Option<Linear>, Refusal> {
         Ok(match expression {
             Expression::Constant(value) => Some(Linear::constant(value.clone())),

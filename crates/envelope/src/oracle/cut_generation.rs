@@ -1,4 +1,4 @@
-//! Derivation of cuts from refused boxes.
+//! Derivation of cuts from rejected boxes.
 
 use elbowroom_num::Rational;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope};
@@ -137,7 +137,7 @@ impl Oracle {
     }
 
     /// Like [`objection`](Self::objection), for a box with one end moved out. If a reason found by
-    /// an earlier search refuses that box as well, it is reused.
+    /// an earlier search rejects that box as well, it is reused.
     ///
     /// # Errors
     /// If there are too many cases to decide.

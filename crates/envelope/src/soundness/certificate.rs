@@ -18,8 +18,7 @@ pub(crate) struct Certificate {
     ends: Vec<(BoxEnd, Rational)>,
     /// Ends that the factors themselves depend on: once one moves, the proof is void.
     pub(crate) fixed: Vec<BoxEnd>,
-    /// Constraints of the sum with their factors; empty unless they are
-    /// [recorded](super::bad_case::Schedules::tell).
+    /// Constraints of the sum with their factors; empty unless the proof is to be exported.
     pub(crate) terms: Vec<(Term, Rational)>,
 }
 

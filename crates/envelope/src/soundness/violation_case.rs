@@ -169,7 +169,7 @@ impl<'a, S: Scale> Schedules<'a, S> {
     }
 
     /// Returns the proof given by a negative cycle; its first constraint, with bound `added`, was
-    /// refused.
+    /// rejected.
     fn certificate(&self, cycle: &NegativeCycle<S::Weight>, added: &Delta) -> Certificate {
         let mut certificate = Certificate::default();
         for id in &cycle.constraints {

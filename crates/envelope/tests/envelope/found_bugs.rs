@@ -314,7 +314,7 @@ fn a_parameter_times_itself_is_not_decided_at_corners() {
 
 #[test]
 fn a_counterexample_to_separation_has_the_happenings_in_order() {
-    // The reverse order with a large distance is harmless, so it is no counterexample.
+    // The reverse order with a large distance is harmless, so it is not a counterexample.
     let given = Given {
         domain: "(:action clear :parameters () :precondition (and) :effect (not (p)))",
         init: "(at 17/2 (p))",

@@ -1,4 +1,4 @@
-//! Forecast for the goal if no more actions are executed: [`Outlook`].
+//! Forecast for the goal if no more actions are executed: [`GoalStatus`].
 
 use elbowroom_model::Footprint;
 use elbowroom_model::ground::Condition;

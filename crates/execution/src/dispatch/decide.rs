@@ -84,7 +84,7 @@ impl Dispatch {
                 }
                 continue;
             }
-            // A window that has closed was reported before, or does not matter to the executor.
+            // A closed window was reported before, or is irrelevant for the executor.
             let latest = self.horizon.window(network_node(node)).1;
             if let Some(latest) = latest.filter(|latest| *latest >= now) {
                 wake_at(latest + &self.epsilon, node);
@@ -110,8 +110,8 @@ impl Dispatch {
         }
     }
 
-    /// Starts these actions, except from the first one on whose conditions do not hold. If that is
-    /// the very first, a new plan is requested.
+    /// Starts these actions in order, up to the first one whose conditions do not hold. If that is
+    /// the first action of the list, a new plan is requested.
     fn order(&mut self, nodes: &[NodeId], now: &Rational, belief: &BeliefState) -> Decided {
         let mut orders = Vec::new();
         for &node in nodes {
@@ -175,7 +175,7 @@ impl Dispatch {
             .max(Rational::ZERO)
     }
 
-    /// Returns the node of a running instance that is to be observed next: its start or its end.
+    /// Returns the node of a running instance that is expected next: its start or its end.
     fn awaited_node(&self, id: InstanceId) -> NodeId {
         let [start, end] = self.ends[id.index()];
         if self.execution_time(start).is_some() {

@@ -45,8 +45,8 @@ pub(super) const REGISTERED: ExecutorEntry = ExecutorEntry {
     },
 };
 
-/// For `lookahead`: greatest number of happenings of a plan whose orders are searched completely
-/// before each start.
+/// For `lookahead`: maximum number of happenings of a plan for which the orders are searched
+/// completely before each start.
 const MAX_EXACT_HAPPENINGS: usize = 20;
 
 /// See [`REGISTERED`]. With foresight it is `lookahead`.

@@ -18,7 +18,7 @@ use crate::reason::{Cause, GuaranteeLevel, Reason, Subject};
 /// makes up for that.
 const ENVELOPE_SHARES: [i64; 7] = [16, 15, 12, 8, 4, 2, 1];
 
-/// A reading of each constraint of a plan.
+/// The role of each constraint of a plan.
 type Readings<'a> = dyn Fn(&Constraint) -> ConstraintRole + 'a;
 
 /// Possible values of [`slack`] in sixteenths, the greatest first.
@@ -376,7 +376,7 @@ impl DurationAssumptions<'_> {
             return ConstraintRole::Contingent { lower, upper };
         };
         // An action may have exceeded its share and still be inside the envelope. Then the share
-        // applies to the rest of its interval.
+        // applies to the remaining part of its interval.
         let has_had_it = upper.as_ref().is_some_and(|upper| *upper < elapsed);
         let upper = if self.is_inside && has_had_it {
             let all = self.interval(parameter, &Rational::ONE).1;

@@ -1,4 +1,5 @@
-//! Choice of the next happening, by orders of a plan or by the table of a small world: [`Chooser`].
+//! Choice of the next happening, by orders of a plan or by the table of a small world:
+//! [`HappeningChooser`].
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -58,7 +59,8 @@ impl HappeningChooser {
         matches!(self, Self::Table { .. })
     }
 
-    /// Keeps an order for as long as it fits, from now on. Returns `false` if that was so before.
+    /// Keeps an order for as long as it fits, from now on. Returns `false` if this was already the
+    /// policy.
     pub(super) fn keep_order(&mut self) -> bool {
         match self {
             Self::OrderSearch(dispatch) => dispatch.keep_order(),

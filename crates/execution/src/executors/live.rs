@@ -62,7 +62,7 @@ struct Live {
     /// The comparison of plans, and the advantage that another plan must have.
     comparator: Option<(Box<dyn PlanComparator>, Rational)>,
     state: Option<ExecutedPlan>,
-    /// The hope for the plan that was abandoned last.
+    /// Reduction of the planned durations that the last abandoned plan needs to succeed.
     reduction: ReductionClass,
     /// A plan that is executed without a guarantee.
     unguaranteed: Option<UnguaranteedPlan>,

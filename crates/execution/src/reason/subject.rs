@@ -1,4 +1,4 @@
-//! The subject of a reason: [`About`], and its text.
+//! The subject of a reason: [`Subject`], and its text.
 
 use std::fmt;
 

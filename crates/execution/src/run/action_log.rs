@@ -27,7 +27,7 @@ pub struct ActionLog {
     entries: BTreeMap<ActionHandle, StartEntry>,
     /// Number of starts. Tickets are issued in this order.
     started: usize,
-    /// Number of entries that were left when entries were last forgotten.
+    /// Number of entries after the last removal of old entries.
     kept_after_pruning: usize,
     /// The steps executed before the run was last idle, for its report.
     finished_steps: VecDeque<ExecutedStep>,
@@ -122,7 +122,7 @@ pub struct ExecutedStep {
 }
 
 impl ActionLog {
-    /// Creates the account of a run that begins in the middle of an execution. It contains only the
+    /// Creates the log of a run that begins in the middle of an execution. It contains only the
     /// running actions.
     pub(super) fn mid_execution(
         belief: &BeliefState,
@@ -162,7 +162,8 @@ impl ActionLog {
         self.started
     }
 
-    /// Restores an account with `started` starts. Starts that are not in `known` are long past.
+    /// Restores a log with `started` starts. Starts that are not in `known` count as long past:
+    /// late reports about them are ignored.
     pub(super) fn restore(&mut self, started: usize, known: Vec<KnownStart>) {
         *self = Self {
             started,
@@ -230,8 +231,8 @@ impl ActionLog {
         self.forget_closed();
     }
 
-    /// Clears the account when no action is running and there is no plan. The latest executed steps
-    /// are kept for the report.
+    /// Clears the log when no action is running and there is no plan. The latest executed steps are
+    /// kept for the report.
     pub(super) fn close(&mut self, now: &Rational) {
         if self.entries.is_empty() {
             return;
@@ -260,9 +261,9 @@ impl ActionLog {
         self.entries.get(&ticket).filter(|it| !it.is_past)
     }
 
-    /// Forgets the earliest starts that have ended and do not belong to the present plan, until at
-    /// most `most` are left, if there are enough of them. It can be called often: it does nothing
-    /// until there are twice as many.
+    /// Forgets the earliest starts that have ended and do not belong to the present plan, so that
+    /// at most `most` remain, if there are enough such starts. It can be called often: it does
+    /// nothing until there are twice as many.
     pub(super) fn forget_earliest(&mut self, most: usize) {
         if self.entries.len() < 2 * most.max(self.kept_after_pruning) {
             return;

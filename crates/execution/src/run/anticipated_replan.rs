@@ -23,7 +23,7 @@ pub(super) struct AnticipatedReplan {
     pub(super) prospect: PredictedState,
     /// The time of the forecast.
     pub(super) since: Rational,
-    /// The time from when a new plan is needed.
+    /// The earliest time at which a new plan is needed.
     until: Rational,
     /// `true` if an unexpected event has happened since.
     is_outdated: bool,
@@ -101,7 +101,7 @@ impl Run<'_> {
         let needs = self.action_log.open_tickets().filter_map(|ticket| {
             let entry = self.action_log.get(ticket)?;
             let window = self.ports.executor.window(entry.step?, true)?.latest?;
-            // If its slack has grown since, there is another warning.
+            // If its slack has grown since then, another warning follows.
             let until = entry.warned.clone()?;
             (until >= window && until >= self.now).then_some(until)
         });

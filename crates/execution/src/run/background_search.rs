@@ -147,8 +147,8 @@ pub(super) struct SearchResults {
     pub(super) inquiry: DoubtInquiry,
     /// The plan that the executor abandoned, until another one is adopted.
     pub(super) abandoned: Option<AbandonedPlan>,
-    /// The time at which no plan was found and the executor carried on, and the verdict otherwise;
-    /// `None` after the next event.
+    /// The time at which no plan was found and the executor continued, and the verdict that applies
+    /// if it stops; `None` after the next event.
     pub(super) failed_at: Option<(Rational, Verdict)>,
     /// `true` if a search for a better plan has used up its budget. No other one begins until there is a new plan.
     pub(super) has_better_search_failed: bool,
@@ -401,7 +401,7 @@ impl Run<'_> {
         &search.started_at + patience * Rational::from(1_i64 << doublings)
     }
 
-    /// Continues the search, if there is one. Returns `true` if the executor is not to be asked
+    /// Continues the search, if there is one. Returns `true` if the executor makes no decision
     /// because of it.
     pub(super) fn poll_planner(&mut self) -> Result<bool, Stop> {
         if self.is_goal_change_pending() {
@@ -469,7 +469,7 @@ impl Run<'_> {
         }
     }
 
-    /// Waits for the plan if only running actions continue. Returns `true` if it does.
+    /// Waits for the plan if only running actions continue. Returns `true` if the run waits.
     fn is_waiting_for_plan(&mut self) -> bool {
         let search = self.search.as_ref();
         let waits = search
@@ -565,7 +565,7 @@ impl Run<'_> {
         }
     }
 
-    /// Continues if there is no plan from a situation in which nothing more is started.
+    /// Handles the answer that no plan exists from a situation without further starts.
     fn handle_missing_plan(
         &mut self,
         search: &BackgroundSearch,

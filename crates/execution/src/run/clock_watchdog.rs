@@ -17,7 +17,7 @@ const ANSWERS_PER_STEP: usize = 10;
 /// [`RunSettings::time_limit`](super::RunSettings::time_limit).
 #[derive(Clone, Debug, Default)]
 pub(super) struct ClockWatchdog {
-    /// Time from when the answers are counted.
+    /// Start time of the count of answers.
     since: Rational,
     answers: usize,
     /// The last message since then that could not be read, with the reason.
@@ -32,12 +32,12 @@ impl ClockWatchdog {
         self.unintelligible = None;
     }
 
-    /// Returns the time from when the answers are counted, and their number.
+    /// Returns the start time of the count of answers, and the number of answers since then.
     pub(super) fn state(&self) -> (Rational, usize) {
         (self.since.clone(), self.answers)
     }
 
-    /// Restores the state that [`Progress::counted`] returned.
+    /// Restores the state that [`state`](Self::state) returned.
     pub(super) fn restore(&mut self, since: Rational, answers: usize) {
         *self = Self {
             since,
@@ -86,7 +86,7 @@ mod tests {
     use super::{ClockWatchdog, MAX_ANSWERS};
     use elbowroom_num::Rational;
 
-    /// Returns the number of accepted answers if the nth has the time `clock(n)`.
+    /// Returns the number of accepted answers if the n-th answer has the time `clock(n)`.
     fn accepted_answers(most: i64, steps: usize, clock: impl Fn(i64) -> Rational) -> i64 {
         let mut progress = ClockWatchdog::default();
         let mut taken = 0..most;

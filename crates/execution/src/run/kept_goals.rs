@@ -113,7 +113,7 @@ impl Run<'_> {
         }
     }
 
-    /// Pursues all goals to keep, also those that hold.
+    /// Pursues all goals to keep, including those that hold.
     pub(super) fn pursue_kept_goals(&mut self) {
         let Some(lasting) = &mut self.goal_manager else {
             return;

@@ -52,7 +52,7 @@ pub(super) enum PreparationFallback {
     SearchAgain(Box<BackgroundSearch>),
     /// The remaining plan was to be kept for other goals. Another plan is made.
     ReplanForGoals(PendingGoalChange),
-    /// The present plan continues, also if the executor does not prefer the prepared one. The
+    /// The present plan continues, even if the executor does not prefer the prepared one. The
     /// prepared plan was requested for this reason.
     ContinuePlan(Reason),
 }

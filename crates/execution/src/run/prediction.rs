@@ -66,7 +66,7 @@ pub(super) struct PredictionHorizon {
 /// Assumption about a running action that should have ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum LateActionAssumption {
-    /// As [`Guess::QuarterLonger`].
+    /// It takes a quarter longer than it has taken so far.
     QuarterLonger,
     /// It does not end. Only an action that is late by no more than [`Run::slack`] and has no
     /// warning ends now.

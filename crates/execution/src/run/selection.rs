@@ -2,13 +2,12 @@
 //! planning).
 //!
 //! The only source of information is the planner: does it find a plan for a set of goals? With up
-//! to [`MOST_EXACT`] goals, the sets are tried in order of their value, which is the sum of the
-//! values of their goals; sets of equal value are tried in order of size and preference. So the
-//! first set with a plan has the greatest value. A superset of a set without a plan is not tried.
-//! A goal that is proven to have no plan is not tried again.
-//! With more goals, the selection grows: first by one goal, after each success by twice as many as
-//! before, and after each failure by half as many. In the end it is maximal, and each plan on the
-//! way is executed at once.
+//! to [`MAX_EXACT_GOALS`] goals, the sets are tried in order of their value, which is the sum of
+//! the values of their goals; sets of equal value are tried in order of size and preference. So the
+//! first set with a plan has the greatest value. A superset of a set without a plan is not tried. A
+//! goal that is proven to have no plan is not tried again. With more goals, the selection grows:
+//! first by one goal, after each success by twice as many as before, and after each failure by half
+//! as many. In the end it is maximal, and each plan on the way is executed at once.
 
 use std::collections::BTreeSet;
 

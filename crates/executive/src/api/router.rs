@@ -53,7 +53,7 @@ impl ApiError {
     }
 }
 
-/// Requests that a run accepts beside its end, from the fewest to the most.
+/// Requests that a run accepts in addition to a stop request, from the smallest to the largest set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Accepted {
     /// None.
@@ -267,7 +267,7 @@ impl ApiRouter {
                 self.stop();
                 respond(stream, 202, TEXT, "The executive is being stopped.\n")
             }
-            // Requests of the buttons on the page.
+            // Paths of the requests that the buttons on the page send.
             ("POST", path @ ("/pause" | "/resume")) => {
                 self.allow(request)?;
                 self.change("POST", &format!("/v1{path}"), b"")?;
@@ -404,7 +404,7 @@ fn first_line(request: &Request) -> Result<Option<usize>, ApiError> {
     })
 }
 
-/// Methods and paths of the pages. They are no part of the `OpenAPI` document.
+/// Methods and paths of the pages. They are not part of the `OpenAPI` document.
 const PAGE: [(&str, &str); 8] = [
     ("GET", "/"),
     ("GET", "/run"),

@@ -308,7 +308,7 @@ documents! {
         pub least: Option<LowerEnd>,
         /// The upper end of the guaranteed interval.
         pub most: Option<UpperEnd>,
-        /// The time-out of the action whose duration it is; none if it is no duration, or if
+        /// The time-out of the action whose duration it is; none if it is not a duration, or if
         /// time-outs are off.
         pub timeout: Option<Exact>,
     }

@@ -60,7 +60,8 @@ struct StatusData {
 }
 
 impl Status {
-    /// Creates the status of a run of this task that has not begun, with this rule for time-outs.
+    /// Creates the status of a run that has not begun. `timeout` is the rule for the time-outs of
+    /// actions.
     pub fn new(task: &Task, timeout: TimeoutRule) -> Self {
         let mut goals = GoalList::default();
         if !task.problem().goal.is_trivial() {

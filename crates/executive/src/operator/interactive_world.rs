@@ -25,8 +25,8 @@ const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// World that waits in short steps and reports pending requests after each step.
 ///
-/// While no action runs, or a plan is made in the background, the world's time passes no faster than the wall
-/// clock.
+/// While no action is running, or while a plan is made in the background, the world's time passes
+/// no faster than the wall clock.
 pub struct InteractiveWorld<'a, W> {
     inner: W,
     queue: Option<RequestQueue>,
@@ -34,7 +34,7 @@ pub struct InteractiveWorld<'a, W> {
     status: Option<Status>,
     task: Arc<Task>,
     stop: Stop,
-    /// Signal of background tasks.
+    /// Completion signal of background tasks.
     signal: CompletionSignal,
     /// Seconds of the world per second of the wall clock.
     factor: Rational,
@@ -188,7 +188,7 @@ impl<W: World> World for InteractiveWorld<'_, W> {
             if let Some(completion) = self.signal.poll() {
                 passage.observations.push(self.observed(completion));
             }
-            // The run decides if a clock without progress is broken.
+            // The run decides whether a clock that does not advance is an error.
             let is_over = !passage.observations.is_empty() || passage.now >= *until || !has_passed;
             if is_over || self.stop.is_requested() {
                 return Ok(passage);

@@ -131,7 +131,8 @@ impl MessageParser {
     /// Parses a line.
     ///
     /// # Errors
-    /// When the line is no message, or an unknown or misplaced one; the error is a message for the user.
+    /// When the line is not a message, or an unknown or misplaced one; the error is a message for
+    /// the user.
     pub fn parse(&mut self, line: &str) -> Result<Message, String> {
         let message = self.parse_line(line)?;
         self.has_spoken = true;

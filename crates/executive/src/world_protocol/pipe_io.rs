@@ -1,4 +1,4 @@
-//! Pipes to a program with timeouts. Reading and writing block, so each pipe has a thread of its own.
+//! Pipes to a program with timeouts. Reading and writing block, so each pipe has its own thread.
 
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::process::{ChildStdin, ChildStdout};

@@ -100,8 +100,7 @@ impl Display for Formula {
     }
 }
 
-/// Returns the probability as written in decimals: the number in the file, not its nearest binary
-/// fraction.
+/// Returns the probability as the decimal number in the file, not as the nearest binary fraction.
 pub(super) fn exact(probability: f64) -> Rational {
     let text = format!("{probability}");
     text.parse()

@@ -102,7 +102,7 @@ struct Happening {
     adds: Facts,
     deletes: Facts,
     owner: Owner,
-    /// `true` if the agent decides that it takes place, `false` if the world does.
+    /// `true` if the agent triggers it, `false` if the world does.
     is_agents: bool,
 }
 

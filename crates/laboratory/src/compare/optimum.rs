@@ -109,7 +109,7 @@ fn mean(bounds: &[Result<(f64, f64), String>]) -> ColumnOptimum {
     sum.mean(unknown.cloned())
 }
 
-/// Bounds of several problems, in whole units of 1 / [`SHARES`], far below 2^52.
+/// Bounds of several problems, in whole units of 1 / [`UNITS`], far below 2^52.
 #[derive(Default)]
 struct Sum {
     lower: f64,

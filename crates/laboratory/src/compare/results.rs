@@ -150,7 +150,7 @@ impl Results {
     /// Reads results as JSON.
     ///
     /// # Errors
-    /// The text does not hold results.
+    /// The text does not contain results.
     pub fn read(text: &str) -> Result<Self, ResultsError> {
         let results: Self = serde_json::from_str(text)
             .map_err(|error| ResultsError(format!("no results: {error}")))?;
@@ -196,7 +196,7 @@ impl Results {
     }
 
     /// Returns the table: coverage with its 95 % interval, and the mean number of new plans of
-    /// successful runs, beside the published figures.
+    /// successful runs, next to the published figures.
     pub fn table(&self, experiment: &Experiment) -> Table {
         let mut headings = vec!["executor".to_owned()];
         for column in &self.columns {

@@ -1,4 +1,4 @@
-//! Data shared by all trials of one problem in one column: [`Place`].
+//! Data shared by all trials of one problem in one column: [`Scenario`].
 
 use std::sync::Arc;
 

@@ -54,7 +54,7 @@ impl PerturbedResults {
     /// Reads results as JSON.
     ///
     /// # Errors
-    /// The text does not hold results.
+    /// The text does not contain results.
     pub fn read(text: &str) -> Result<Self, PerturbedError> {
         let results: Self = serde_json::from_str(text)
             .map_err(|error| PerturbedError::other(format!("no results: {error}")))?;

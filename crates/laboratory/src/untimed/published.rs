@@ -1,4 +1,4 @@
-//! Olisipo in the version that made the paper's table: [`AsPublished`].
+//! Olisipo in the version that made the paper's table: [`PublishedExecutor`].
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -18,8 +18,9 @@ use super::{InstrumentedWorld, UntimedExecutor, apply, holds, start_of};
 /// - the search returns the *last* order found, not the best;
 /// - the belief is never updated, so that no later search finds an order: there is one order in
 ///   each trial;
-/// - if a layer fits and an action is running, that action ends, whatever the layer; so actions are
-///   executed one after the other. Otherwise, only layers before a start count.
+/// - if a layer fits and an action is running, the next step is the end of that action, whatever
+///   the layer; so actions are executed one after the other. If no action is running, only layers
+///   before a start are considered.
 ///
 /// There is one difference. When no layer fitted any more, the program continued in the remaining
 /// rounds with the old order applied to the happenings of new plans. This never reached the goal,

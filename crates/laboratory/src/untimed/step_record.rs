@@ -1,4 +1,4 @@
-//! Record of the steps of a trial: [`Course`].
+//! Record of the steps of a trial: [`StepRecord`].
 
 use elbowroom_model::ground::{Action, FactId};
 use elbowroom_model::{State, TimeTriggeredPlan};

@@ -1,4 +1,4 @@
-//! Likelihoods of a task's facts and actions, prepared for sampling: [`Chances`].
+//! Likelihoods of a task's facts and actions, prepared for sampling: [`EventProbabilities`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -87,8 +87,8 @@ impl EventProbabilities {
         })
     }
 
-    /// Returns the chances of an action, or `None` if it was not passed to [`Chances::new`]. Such
-    /// an action never starts.
+    /// Returns the probabilities of an action, or `None` if it was not passed to
+    /// [`EventProbabilities::new`]. Such an action never starts.
     pub(super) fn of(&self, action: &Action) -> Option<&ActionProbabilities> {
         self.actions.get(&(action.schema, action.arguments.clone()))
     }

@@ -33,8 +33,8 @@ pub struct Perturbation {
 ///   fact, and otherwise the achievement.
 /// - Only one fact changes each time. The first drawn change selects the fact, and the last drawn
 ///   change decides whether it becomes true or false, even if it is about another fact.
-/// - Messages are counted to find out whether they start or end an action. An action that was
-///   abandoned after its start has its end effects when it is started again.
+/// - Messages are counted to find out whether they start or end an action. So if an action was
+///   abandoned after its start, the next start of it counts as its end and has the end effects.
 ///
 /// Only the spontaneous changes depend on the seed.
 #[derive(Clone, Debug)]

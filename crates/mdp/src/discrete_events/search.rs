@@ -11,14 +11,14 @@ use crate::{
     Grid, NotTabulated, ROUNDING_MARGIN, Settings, Side, Stop, cell_probabilities_of, graph, step,
 };
 
-/// The bounds found.
+/// Bounds from both sides, with the restricted agent behind the lower one.
 pub(crate) struct FoundBounds {
     pub(crate) grid: Grid,
     /// Number of cells of the lower bound.
     pub(crate) cells: usize,
-    /// The restricted agent behind the lower bound.
+    /// The restricted agent that attains the lower bound.
     pub(crate) within: Option<RestrictedAgent>,
-    /// `true` for each side with a computed bound: below, above.
+    /// For each side (below, above), `true` if a bound was computed.
     is_computed: [bool; 2],
 }
 

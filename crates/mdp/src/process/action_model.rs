@@ -201,7 +201,7 @@ impl Event {
 }
 
 impl ActionModel {
-    /// Returns `true` if its end alone satisfies the goal.
+    /// Returns `true` if the end of the action alone satisfies the goal.
     pub(crate) fn achieves_goal(&self, goal: &Needs) -> bool {
         self.rest.iter().any(|(_, end)| goal.holds(end.adds))
     }

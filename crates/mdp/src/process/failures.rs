@@ -16,7 +16,8 @@ pub struct FailureKind {
     pub adds: Facts,
     /// The deleted facts.
     pub deletes: Facts,
-    /// Time for which the failed action is still running and cannot be cancelled, in seconds.
+    /// Time in seconds for which the action continues to run after the failure; it cannot be
+    /// cancelled then.
     pub delay: f64,
 }
 

@@ -2,7 +2,7 @@
 //!
 //! A condition that compares a number is an additional fact. In the upper bound it holds if some of
 //! the values satisfy it, in the lower bound if all do. Amounts drawn at an action's end are
-//! divided into intervals where they decide a condition ([`cuts`]).
+//! divided into intervals where they decide a condition (`breakpoints`).
 
 mod breakpoints;
 
@@ -82,11 +82,11 @@ pub(crate) enum ChangeOperator {
 pub(crate) enum ChangeValue {
     /// A constant, in millionths.
     Constant(i64),
-    /// A random value, drawn by a rule for a planned one.
+    /// A random value: drawn by a rule of the world file that applies to a planned value.
     Random { rule: Rule, planned: f64 },
 }
 
-/// Returns a number in millionths, if it is a whole number of them.
+/// Returns a number in millionths; `None` if that is not a whole number.
 pub(crate) fn units(value: &Rational) -> Option<i64> {
     let (whole, one) = (value * &Rational::from(UNIT)).as_small()?;
     (one == 1 && whole.abs() < INFINITE).then_some(whole)
@@ -124,7 +124,7 @@ impl Span {
     }
 }
 
-/// Adds two lower or two upper ends; values beyond [`FAR`] are infinite.
+/// Adds two lower or two upper ends; values beyond [`INFINITE`] are infinite.
 fn sum(left: i64, right: i64) -> i64 {
     if left.abs() >= INFINITE {
         left

@@ -220,7 +220,7 @@ impl TimedWorld {
             || self.acts[act].changes_numbers()
     }
 
-    /// Returns the same world for a bound of this side.
+    /// Returns this world with comparisons evaluated for a bound of the given side.
     pub(crate) fn for_bound(&self, side: Bounding) -> Self {
         Self {
             side,
@@ -327,7 +327,7 @@ fn latest(events: &[Event], model: &WorldModel) -> Result<f64, NotTabulated> {
                 late = middle;
             }
         }
-        // Rounded up to the resolution, so that boundaries of cells are round numbers.
+        // The time is rounded up to the resolution, so that boundaries of cells are round numbers.
         let resolution = model.resolution.to_f64();
         latest = latest.max((late / resolution - 1e-6).ceil() * resolution);
     }

@@ -12,7 +12,7 @@ struct Footprint {
     deletes: Facts,
     /// The changed numbers, as bits.
     numbers: u64,
-    /// Those of them that are assigned.
+    /// The changed numbers that are assigned, as bits.
     sets: u64,
 }
 

@@ -68,7 +68,7 @@ fn has_same_end(one: &ActionModel, other: &ActionModel) -> bool {
 }
 
 impl Cell<'_> {
-    /// Returns the choices if there is a move that is optimal before all others.
+    /// Returns the choices of the move that is optimal to make first, if there is one.
     pub(crate) fn dominant_choices(
         &mut self,
         moment: &Moment,

@@ -70,7 +70,8 @@ struct Join<'r, 'a> {
 enum Candidates<'r> {
     /// All arguments are known: this fact only.
     One(u32),
-    /// The shortest list of the index. The other arguments have to be compared.
+    /// The shortest list of facts in the index that share one argument. The other arguments have to
+    /// be compared.
     Listed(&'r [u32]),
 }
 

@@ -2,8 +2,8 @@
 
 use crate::problem::{Condition, Expression, Term};
 
-/// Marks each variable read. Variables of inner quantifiers have positions beyond the end of
-/// `read`.
+/// Marks each variable read. Variables that inner quantifiers bind have positions beyond the end of
+/// `read` and are not marked.
 pub(super) fn of_condition(condition: &Condition, read: &mut [bool]) {
     match condition {
         Condition::Atom(atom) => of_terms(&atom.arguments, read),

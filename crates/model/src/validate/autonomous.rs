@@ -1,12 +1,13 @@
 //! Processes and events between two happening groups.
 //!
 //! The time between two groups is cut at each event, and at each start or stop of a process. These
-//! moments are zeros of polynomials, and may be irrational. Up to a rational moment, the state
-//! advances as it does to a group. From an irrational moment on, polynomials continue on the same
-//! clock, with a new constant, if that is rational: this is so where the motion of a number does
-//! not change, where its value is rational, and where it reaches the bound of a condition. A number
-//! whose constant is irrational has no value until it is assigned a new one. The plan is undecided
-//! if a condition or an effect reads it before.
+//! moments are zeros of polynomials, and may be irrational. If the moment is rational, the state
+//! advances to it in the same way as to a happening group. After an irrational moment, the
+//! polynomials keep their time variable, with a new constant term if that is rational. It is
+//! rational if the motion of the number does not change, if its value is rational, or if it reaches
+//! the bound of a condition. A number whose constant is irrational has no value until it is
+//! assigned a new one. The plan is undecided if a condition or an effect reads the number before
+//! that.
 //!
 //! At each moment, conditions that are true at the moment are processed first, and then those that
 //! are true right after it: an event on `(> x 1)` happens right after `x` has reached 1. The

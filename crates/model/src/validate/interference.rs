@@ -140,7 +140,7 @@ fn compare<'a>(
     first: &Happening<'a>,
     second: &Happening<'a>,
 ) -> Result<(), Abort> {
-    // Times of timed initials are no mistake of the plan.
+    // Times of timed initials are not a mistake of the plan.
     let are_both_timed = matches!(
         (first.kind, second.kind),
         (HappeningKind::Timed(_), HappeningKind::Timed(_))

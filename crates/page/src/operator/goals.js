@@ -1,4 +1,4 @@
-// The goals board: the open goals, and those that were closed last.
+// The list of goals: the open ones, and those that were closed last.
 
 const MAX_CLOSED = 100;
 

@@ -1,10 +1,10 @@
-// One lane for each robot: what it did last, what it does, what is next, and how long that may take.
+// One lane for each robot: its last, running and next action, and their possible durations.
 
 // The lengths of the axis, which is labelled at its quarters.
 const SPANS = [4, 8, 20, 40, 80, 120, 240, 400, 800, 1200, 2400, 4800, 14400, 43200, 86400];
 const PAST = 0.25;
 const DRAWN_EVERY = 200;
-// The lane of the actions of no robot.
+// The lane of the actions without a robot.
 const OTHERS = "others";
 
 // The interval of the duration of a step, if the guarantee has one. Without an upper limit it ends at infinity.
@@ -16,7 +16,7 @@ function durationOf(step, state) {
   return { least: Math.max(0, end(it.least)), most: end(it.most), nominal: it.nominal };
 }
 
-// How long an action may take under the guarantee.
+// The possible duration of an action under the guarantee.
 function windowWords(it) {
   if (!it) return "";
   return it.most === Infinity ? `, may take ${nearest(it.least)} or longer` : `, may take ${nearest(it.least)} to ${nearest(it.most)}`;
@@ -29,7 +29,7 @@ function actionsOf(state, now) {
   const running = members(state.running).map((it) => {
     const step = steps.find((own) => own.ticket === it.ticket);
     const room = durationOf(step, state);
-    // A plan that was adopted during the action counts from its own start of it.
+    // A plan that was adopted during the action has a different start time for it.
     const start = step && it.since < (state.plan.since ?? 0) ? step.start : it.since;
     const planned = step?.duration ?? it.planned ?? 0;
     return { ...it, kind: "running", start: it.since, end: Math.max(now, start + planned), room, from: start };
@@ -73,7 +73,7 @@ function drawStrip(node, from, span) {
   const long = (start, end) => `${Math.max(0.3, 100 * (Math.min(end, from + span) - Math.max(start, from)) / span).toFixed(2)}%`;
   const shown = (node.actions ?? []).filter((it) => it.end >= from && it.start <= from + span);
   const bars = shown.map((it) => ({ key: `${it.ticket ?? it.parameter} ${it.action} ${it.kind} ${it.ticket === undefined ? it.planned : ""}`, it, start: it.start, end: it.end, kind: it.kind, label: it.action.replace(/^\(|\)$/g, "") }));
-  // How long the running actions, or else the next one, may take: their ends lie in windows.
+  // The windows of the ends of the running actions, or of the next one if none is running.
   const running = shown.filter((it) => it.kind === "running");
   for (const it of running.length ? running : shown.filter((own) => own.kind === "to-come").slice(0, 1)) {
     if (!it.room) continue;
@@ -118,7 +118,7 @@ function showLanes(state, now, isChanged) {
   reconcile(byId("lanes"), sorted, (it) => it.name, laneItem, (node, it) => showLane(node, it, now));
   byId("no-lane").hidden = sorted.length > 0;
   for (const id of ["axis", "legend"]) byId(id).hidden = sorted.length === 0;
-  // The axis shows all that is open; if nothing is, the action that ended last.
+  // The axis shows all actions that have not ended; if there are none, the last one that ended.
   const ahead = Math.max(0, ...actions.filter((it) => it.kind === "running" || it.kind === "to-come").map((it) => it.end - now));
   const last = actions.filter((it) => it.end <= now).sort((a, b) => a.end - b.end).at(-1);
   const wanted = ahead > 0 || !last ? ahead / (1 - PAST) * 0.8 : (now - last.start) / PAST;

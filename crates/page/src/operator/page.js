@@ -1,9 +1,9 @@
-// Puts the page together after each message, and moves its clock in between.
+// Rebuilds the page after each message, and advances its clock between messages.
 
 const TICK = 100;
 let announcedBefore = null, isChanged = false;
 
-// Says to a screen reader what is new: the activity, the connection, and warnings. Times that count are left out.
+// Announces changes to screen readers: the activity, the connection, and warnings, without counting times.
 function announce(texts) {
   if (announcedBefore) {
     const news = texts.filter((it) => !announcedBefore.includes(it));

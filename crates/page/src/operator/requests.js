@@ -14,7 +14,7 @@ async function request(method, path) {
   return answer?.status ?? 0;
 }
 
-// Asks the operator before something that cannot be undone. The focus is on "no" first, and returns afterwards.
+// Requests a confirmation before an irreversible action. The focus is on "no" first, and returns afterwards.
 function confirmed(title, text, verb) {
   const dialog = byId("question");
   byId("question-title").textContent = title;

@@ -1,4 +1,4 @@
-// The guarantee, and how much of its intervals is left now.
+// The guarantee, and the remaining part of its intervals.
 
 const TIGHTEST = 6;
 

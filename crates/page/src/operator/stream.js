@@ -25,7 +25,7 @@ function worldClock() {
   };
   return {
     now,
-    // A clock that stood still, started again or jumped has another rate.
+    // After a clock stood still, was restarted or jumped, its rate is measured again.
     set(time) {
       const at = performance.now();
       const last = samples.at(-1);
@@ -88,7 +88,7 @@ function follow(changed) {
   return view;
 }
 
-// How the page is connected, and whether that is a warning.
+// The state of the connection, and true if it is a warning.
 function connection(view) {
   const silent = performance.now() - view.received;
   if (view.isOver) return { words: "the executive has ended", isBad: false };

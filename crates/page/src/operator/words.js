@@ -14,7 +14,7 @@ function nearest(value) {
   return text === "-0" ? "0" : text;
 }
 
-// A duration that changes while it is displayed, with one digit.
+// Formats a duration that changes while it is displayed, with one decimal digit.
 const seconds = (value) => `${value.toFixed(1)} s`;
 
 const stateWords = (state) => state.replaceAll("-", " ");
@@ -44,7 +44,7 @@ function reconcile(list, items, keyOf, create, update) {
 // The members of an object of the document, in the order of their keys.
 const members = (object) => Object.values(object ?? {});
 
-// The part of a class that stands for this role in an element made by one of the views.
+// Returns the part with this role in an element of one of the views.
 const part = (node, name) => node.querySelector(`[data-part="${name}"]`);
 
 // An action that runs, as `ctl state` writes it.
@@ -56,7 +56,7 @@ function runningWords(it) {
   return it.note ? `${text}: ${it.note}` : text;
 }
 
-// The warnings of the state: each with its words and, if it has one, the time until which something can be done.
+// The warnings of the state: each with its words and, if it has one, the time left to react.
 function warnings(state, now) {
   const found = [];
   if (state.restarting !== undefined) found.push({ key: "restarting", kind: "world restarting", words: `world restarting: ${state.restarting}` });
@@ -77,6 +77,6 @@ function warnings(state, now) {
   return found;
 }
 
-// A deadline is a warning for the last minute of the world's clock.
+// A deadline is a warning during the last minute before it, on the world's clock.
 const SOON_DUE = 60;
 const isClosed = (goal) => ["achieved", "cancelled", "failed"].includes(goal.state);

@@ -1,4 +1,4 @@
-// A chart that scrolls, zooms, and is walked through with the arrow keys.
+// A chart that scrolls, zooms, and supports navigation with the arrow keys.
 
 // `life` ends when the chart is replaced by another.
 function chartView(chart, textOf, onPick, life) {
@@ -10,7 +10,7 @@ function chartView(chart, textOf, onPick, life) {
   }, sizer);
   const panel = element("div", { class: "panel", role: "status", "aria-live": "polite" });
   let grouping = chart.chosen, plan = -1, zoom = 1, current = -1, cursor = null;
-  // In a short plan, each action with its bands has room for itself.
+  // In a short plan, each action with its bands has a separate row.
   let spread = !chart.is_run && chart.bars.length <= 60;
   let layout = packed(chart.bars, chart.groupings, grouping, plan, spread);
 
@@ -67,7 +67,7 @@ function chartView(chart, textOf, onPick, life) {
     onPick(index);
   }
 
-  // Scrolls so that the bar is in sight.
+  // Scrolls until the bar is visible.
   function show(index) {
     const { width, gutter, scale } = geometry();
     const [begin, end] = extent(chart.bars[index]);
@@ -92,7 +92,7 @@ function chartView(chart, textOf, onPick, life) {
     repaint();
   }
 
-  // The row of a bar above or below, at about the same time.
+  // Returns the row of a bar above or below, at about the same time.
   function besides(by) {
     const row = layout.rowOf.get(current);
     const bars = layout.rows[row + by];
@@ -132,7 +132,7 @@ function chartView(chart, textOf, onPick, life) {
     const box = scroll.getBoundingClientRect(), { gutter, inner } = geometry();
     zoomBy(event.deltaY < 0 ? 1.25 : 0.8, Math.max(0, Math.min(1, (event.clientX - box.left - gutter) / inner)));
   }, { passive: false });
-  // The bar under the pointer, give or take two pixels.
+  // Returns the bar within two pixels of the pointer.
   function under(event) {
     const box = scroll.getBoundingClientRect(), { gutter, scale } = geometry();
     const [across, down] = [event.clientX - box.left - gutter, event.clientY - box.top - head];
@@ -172,7 +172,7 @@ function chartView(chart, textOf, onPick, life) {
       element("button", { type: "button", "aria-label": "zoom in", onclick: () => zoomBy(1.6) }, "+"), " ",
       element("button", { type: "button", onclick: keys["0"] }, "fit")));
 
-  // Other times for the actions, and the planned ones again; what is described stays as planned.
+  // Draws the actions at other times, or at the planned ones again. Descriptions keep the planned times.
   const asPlanned = chart.bars.map(({ planned, starts, ends }) => ({ planned, starts, ends }));
   const asPlannedEnd = chart.end;
   const move = (spans) => {
@@ -197,7 +197,7 @@ function chartView(chart, textOf, onPick, life) {
   return { node, pick: (index) => pick(index, true), paint, move, cursor: (time) => { cursor = time; repaint(); }, chosen, choose: restore };
 }
 
-// What the shapes mean; only those that occur.
+// Legend of the shapes that occur.
 function legend(chart) {
   const has = (test) => chart.bars.some(test);
   const entry = (text, ...shapes) => element("li", {}, shape("svg", { width: 30, height: 16, "aria-hidden": "true" }, ...shapes), text);
@@ -218,7 +218,7 @@ function legend(chart) {
     chart.marks.some((mark) => mark.is_event) ? entry("plan abandoned", shape("line", { class: "event", x1: 14, x2: 14, y1: 1, y2: 15 }), shape("path", { class: "crossing", d: "M14 3l5 5l-5 5l-5 -5z" })) : null);
 }
 
-// The moments as text: names are cut off in the chart.
+// The moments as text, because the chart truncates their names.
 function marksList(chart) {
   if (!chart.marks.length) return null;
   const rows = chart.marks.slice(0, 1000).map((mark) => element("li", {}, `${rounded(mark.at, 0.001)}: `, words(mark.name)));

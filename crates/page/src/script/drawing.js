@@ -1,10 +1,9 @@
-// What a chart looks like: everything that lies inside the window, and nothing else.
+// Drawing of a chart: only the part inside the window.
 
 const ROW = 34, AXIS = 22, STRIP = 22, LETTER = 6.6, MANY = 400;
 
-// Rows for the bars of a lane, so that none covers another: each goes to the first row that is free.
-// What was planned is drawn above what was done, so these two need not be free at the same time. With
-// `spread`, bands count, too.
+// Assigns the bars of a lane to rows without overlap: each bar gets the first free row. Planned bars are drawn
+// above executed ones, so the two do not exclude each other. With `spread`, bands also occupy their row.
 function packed(bars, groupings, grouping, plan, spread) {
   const reach = spread ? widest : extent;
   const lanes = groupings[grouping].lanes.map((name) => ({ name, rows: [], bars: [] }));
@@ -30,7 +29,7 @@ function packed(bars, groupings, grouping, plan, spread) {
   return { lanes: used, rows, rowOf, order, reach };
 }
 
-// From when to when a bar takes up its row.
+// The interval of time for which a bar occupies its row.
 function extent({ planned, actual }) {
   if (!planned || !actual) return planned ?? actual;
   return [Math.min(planned[0], actual[0]), Math.max(planned[1], actual[1])];
@@ -67,7 +66,7 @@ function draw(svg, chart, layout, view) {
     if (x(time) + text.length * LETTER + 4 <= width) ticks.push(shape("text", { x: x(time) + 3, y: 14, class: "faint" }, text));
   }
 
-  // The bars in sight.
+  // The visible bars.
   const seen = [];
   const from = Math.max(0, Math.floor(top / ROW) - 1);
   const to = Math.min(layout.rows.length, Math.ceil((top + height - head) / ROW) + 1);
@@ -78,14 +77,14 @@ function draw(svg, chart, layout, view) {
       const index = bars[position], bar = chart.bars[index];
       const [begin, end] = layout.reach(bar);
       if (x(begin) > width) break;
-      // What is no wider than a pixel, on a pixel that is drawn already, would not be seen.
+      // A bar of at most one pixel on a pixel that is already drawn is invisible.
       if (x(end) < gutter || x(end) < covered + 0.7 && index !== current) continue;
       covered = Math.max(covered, x(end));
       seen.push({ bar, index, row, next: chart.bars[bars[position + 1]], y: head + row * ROW - top });
     }
   }
 
-  // Many bars are one shape for each kind of them: a shape for each bar would take too long.
+  // Many bars of one kind share one shape, because one shape for each bar would take too long.
   const boxes = seen.length > MANY ? {} : null;
   let row = -1, covered;
   for (const one of seen) {
@@ -102,7 +101,7 @@ function draw(svg, chart, layout, view) {
   }
   for (const kind in boxes) front.unshift(shape("path", { class: kind, d: boxes[kind] }));
 
-  // When it may start or end. Where bands of one row overlap, the first is drawn, and that of the bar pointed
+  // Bands: possible start and end times. Of overlapping bands in a row, the first is drawn, and that of the bar pointed
   // at.
   function band(range, kind, height, isCurrent) {
     if (!range) return "";
@@ -123,7 +122,7 @@ function draw(svg, chart, layout, view) {
     front.push(shape("line", { class: "cursor", x1: x(cursor), x2: x(cursor), y1: 0, y2: height }));
   }
 
-  // The head stays where it is: axis, guarantee, names of the moments.
+  // The fixed head: axis, guarantee, names of the moments.
   const fixed = [shape("rect", { class: "gutter", x: 0, y: 0, width, height: head }), ...ticks];
   for (const segment of chart.guarantee) {
     const [a, b] = [Math.max(gutter, clamp(x(segment.from))), clamp(x(segment.to))];
@@ -140,7 +139,7 @@ function draw(svg, chart, layout, view) {
       if (at < gutter - 1 || at > width) continue;
       const y = marksTop + 8;
       fixed.push(shape("path", { class: mark.is_event ? "crossing" : "diamond", d: `M${at} ${y - 5}l5 5l-5 5l-5 -5z` }));
-      // To the right of its diamond if there is room, else to the left of it.
+      // To the right of its diamond if there is space, otherwise to the left.
       const length = mark.name.length * LETTER + 8;
       if (at + 6 >= free && at + length <= width) {
         fixed.push(shape("text", { x: at + 8, y: y + 4, direction: "ltr" }, mark.name));
@@ -155,7 +154,7 @@ function draw(svg, chart, layout, view) {
     }
   }
 
-  // The names of the lanes, in front of what scrolls behind them.
+  // The names of the lanes, in front of the scrolling part.
   const names = [shape("rect", { class: "gutter", x: 0, y: head, width: gutter, height: height - head })];
   for (const [position, lane] of layout.lanes.entries()) {
     const y = head + lane.top * ROW - top;
@@ -179,14 +178,14 @@ function firstInSight(bars, row, time, reach) {
     if (reach(bars[row[middle]])[1] < time) low = middle + 1;
     else high = middle;
   }
-  // One more, whose bands may reach further than it does.
+  // One more bar, whose bands may extend beyond it.
   return Math.max(0, low - 1);
 }
 
-// Where the bar itself is, from when to when.
+// Start and end of the bar itself.
 const drawnSpan = (bar) => bar.actual ?? bar.planned;
 
-// A bar, what was planned above it, and a frame if it is pointed at. With `boxes`, into these.
+// Draws a bar, the planned bar above it, and a frame if it is pointed at. With `boxes`, adds to these.
 function drawBox(into, boxes, bar, index, x, clamp, y, isCurrent) {
   const box = (span, kind, top, height) => {
     const [a, b] = [clamp(x(span[0])), clamp(x(span[1]))];
@@ -198,14 +197,14 @@ function drawBox(into, boxes, bar, index, x, clamp, y, isCurrent) {
   if (bar.actual && bar.planned) box(bar.planned, "plan", 2, 4);
   const [top, height] = bar.actual ? [7, 14] : [4, 16];
   const [a, b] = box(drawnSpan(bar), `bar ${bar.outcome}`, top, height);
-  // Not by colour alone: what failed is crossed out.
+  // Failed actions are crossed out, so that colour is not the only mark.
   if (bar.outcome === "failed" && b - a > 10) {
     into.push(shape("path", { class: "cross", d: `M${b - 9} ${y + 10}l6 8m0 -8l-6 8` }));
   }
   if (isCurrent) into.push(shape("rect", { class: "current", x: a - 3, y: y + 1, width: b - a + 6, height: 22, rx: 3 }));
 }
 
-// The name in the bar, or behind it, or nowhere: where it has room.
+// Writes the name in the bar or behind it, or omits it if there is no space.
 function label(into, bar, begin, end, following, y) {
   const name = bar.name.replace(/^\(|\)$/g, "");
   const inside = end - begin - 8, behind = following - end - 10;

@@ -1,4 +1,4 @@
-// Elements and texts. Whatever comes from the data is set as text, never as markup.
+// Elements and texts. Data is set as text, never as markup.
 
 const SVG = "http://www.w3.org/2000/svg";
 const LONG = 400;
@@ -15,28 +15,28 @@ function put(node, attributes, children) {
 const element = (tag, attributes, ...children) => put(document.createElement(tag), attributes, children);
 const shape = (tag, attributes, ...children) => put(document.createElementNS(SVG, tag), attributes, children);
 
-// A text of the data, in whichever direction it is written; a long one is folded.
+// A text of the data, in its own writing direction; a long text is folded.
 function words(text) {
   if (text.length <= LONG) return element("span", { class: "text", dir: "auto" }, text);
   const start = element("summary", { class: "text", dir: "auto" }, `${text.slice(0, 120)}… (${text.length} characters)`);
   return element("details", { class: "long" }, start, element("span", { class: "text", dir: "auto" }, text));
 }
 
-// A time for a slider or an axis: as many digits as there is something to tell apart.
+// Formats a time for a slider or an axis, with as many digits as are needed to distinguish the times.
 function rounded(value, step) {
   const digits = Math.max(0, Math.min(6, Math.ceil(-Math.log10(step))));
   const text = value.toFixed(digits);
   return text.includes(".") ? text.replace(/\.?0+$/, "") : text;
 }
 
-// Round steps, so that about so many fit.
+// Returns a round step, so that about `count` steps fit.
 function niceStep(range, count) {
   const raw = range / Math.max(1, count);
   const power = 10 ** Math.floor(Math.log10(raw));
   return power * ([1, 2, 5, 10].find((factor) => factor * power >= raw) ?? 10);
 }
 
-// Once before the next frame, however often it is asked for.
+// Calls a function once before the next frame, even if it was requested several times.
 function soon(task) {
   let waiting = false;
   return () => {
@@ -46,7 +46,7 @@ function soon(task) {
   };
 }
 
-// The last position whose time is not after `time`, or -1; `times` ascend.
+// Returns the last position with a time of at most `time`, or -1; `times` is ascending.
 function lastAt(times, time) {
   let [low, high] = [0, times.length];
   while (low < high) {

@@ -1,20 +1,20 @@
-// A run that goes on: what is new is fetched from the program that runs it, at most twice a second.
+// Live page of a run: fetches new data from the executing program, at most twice a second.
 
 const OFTEN = 500;
 const SOON = 50;
 
-// Somebody who presses a button or drags something is not interrupted.
+// The page is not replaced while the user presses a button or drags.
 let released = Promise.resolve();
 if ("live" in document.documentElement.dataset) {
   addEventListener("pointerdown", () => {
     released = new Promise((done) => {
-      // A click comes after its pointer has gone up.
+      // The click event follows the release of the pointer.
       for (const name of ["pointerup", "pointercancel"]) addEventListener(name, () => setTimeout(done), { once: true });
     });
   }, { capture: true });
 }
 
-// Notes what is open, and where the keyboard is; the function that comes back says so to what has taken its place.
+// Saves the open elements and the keyboard focus. The returned function restores them in the new elements.
 function place(main) {
   const key = (section) => section.querySelector("h2")?.textContent;
   const within = (section) => [...section.querySelectorAll("a, button, input, select, summary, [tabindex]")];
@@ -44,7 +44,7 @@ function liveView(update) {
   const status = element("p", { class: "note", role: "status" }, "The page is not connected yet.");
   const following = element("input", { type: "checkbox", checked: true, onchange: () => { if (following.checked) refresh(); } });
   const token = new URLSearchParams(location.hash.slice(1)).get("token");
-  // What is asked of the run; whether it was taken in comes back with its next document.
+  // Sends a request to the run. The next document shows whether it was accepted.
   async function ask(what, button) {
     button.disabled = true;
     const answer = await fetch(what, { method: "POST", headers: { authorization: `Bearer ${token}` } }).catch(() => null);
@@ -68,7 +68,7 @@ function liveView(update) {
     if (isBusy || isOver || !following.checked) return;
     isBusy = true;
     while (isStale && following.checked && !isOver) {
-      // The end is told right behind the last change, and nobody answers after it.
+      // The message `over` follows the last change immediately, and the server does not answer after it.
       await new Promise((done) => setTimeout(done, SOON));
       if (isOver) break;
       isStale = false;

@@ -1,7 +1,7 @@
-// Puts the page together, and again whenever there is more to show of a run that goes on.
+// Builds the page, and rebuilds it whenever a live run has new data.
 
 let data = JSON.parse(document.getElementById("data").textContent);
-// The pages that led to this one, with how far they were scrolled.
+// The previous pages, with their scroll positions.
 const before = [];
 const textOf = (text) => (typeof text === "number" ? data.texts[text] : text);
 const main = document.getElementById("main");
@@ -28,7 +28,7 @@ function open(page) {
 }
 
 function show() {
-  // What the reader has chosen stays.
+  // The user's selections are kept.
   const kept = new Map(views.map(([heading, view]) => [heading, view.chosen?.()]));
   life?.abort();
   life = new AbortController();

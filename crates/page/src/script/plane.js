@@ -1,10 +1,10 @@
-// Two quantities of a region: where the plan works, with the others at values that can be chosen.
+// Slice of a region by two quantities: the values for which the plan works, with the others at chosen values.
 
-// The lines of boxes: colours of Okabe and Ito, each with dashes of its own.
+// The lines of boxes: colours of Okabe and Ito, each with a different dash pattern.
 const BOX_DASHES = ["", "9 4", "3 3", "11 3 2 3"];
 const PLANE = { left: 58, top: 8, side: 360, below: 46 };
 
-// `isDriven`: the values come from other sliders, by `set`.
+// `isDriven`: other sliders set the values, by `set`.
 function planeView(section, isDriven) {
   const own = section.quantities;
   const values = own.map((it) => it.nominal);
@@ -30,7 +30,7 @@ function planeView(section, isDriven) {
   });
   const legend = element("ul", { class: "legend" });
 
-  // What is left of a piece when all but some quantities have their values.
+  // Returns the inequalities of a piece after substituting the values of all but some quantities.
   const cut = (piece, free) => piece.map(({ factors, bound }) => {
     const row = { factors: free.map(() => 0), bound };
     for (const [index, factor] of factors) {
@@ -41,7 +41,7 @@ function planeView(section, isDriven) {
     return row;
   });
 
-  // From where to where one quantity may go alone: an interval for each piece.
+  // Returns the intervals of one quantity with the others fixed, one for each piece.
   function reach(index) {
     return section.pieces.map((piece) => {
       let [low, high] = [-Infinity, Infinity];

@@ -34,7 +34,7 @@ function seriesView(section) {
     const x = (time) => 2 + (time / section.end) * 396, y = (value) => 64 - ((value - low) / range) * 56;
     const path = [...line.points, [section.end, values.at(-1)]].map(([time, value], index) => `${index ? "L" : "M"}${x(time).toFixed(2)} ${y(value).toFixed(2)}`).join("");
     const cursor = shape("line", { class: "cursor", x1: -1, x2: -1, y1: 0, y2: 72, "vector-effect": "non-scaling-stroke" });
-    // A limit is a line with the side that was not allowed hatched; a moment is as wide as can be seen.
+    // A limit is a line with the forbidden side hatched; a moment has the smallest visible width.
     const limits = line.limits.map((limit) => {
         const [from, to] = [Math.max(2, x(limit.from)), Math.min(398, x(limit.to))];
         const [left, right] = to - from < 4 ? [from - 2, from + 2] : [from, to];

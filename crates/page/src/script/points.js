@@ -1,8 +1,8 @@
-// Whether a plan works with given values: exact, in whole numbers.
+// Decides exactly, in whole numbers, whether a plan works with given values.
 //
-// In: the inequalities that the answer about an envelope writes out (docs/formats/envelope-json.md), and a value
-// for each parameter, as a text: `10`, `0.25`, `1393/2`. The plan works if its network has a schedule and no
-// requirement can be broken in any of its schedules.
+// Input: the inequalities of the answer of `envelope` (docs/formats/envelope-json.md), and a value for each
+// parameter, as a text: `10`, `0.25`, `1393/2`. The plan works if its network has a schedule and no schedule
+// violates a requirement.
 
 // Fractions: [numerator, denominator], in lowest terms, the denominator positive.
 const gcd = (a, b) => { while (b) [a, b] = [b, a % b]; return a < 0n ? -a : a; };
@@ -42,7 +42,7 @@ function readRow(text) {
   return { terms, isStrict };
 }
 
-// The row with values put in: coefficients of times, and a constant.
+// The row after substitution of the values: coefficients of times, and a constant.
 function valued({ terms, isStrict }, values) {
   const by = new Map();
   let constant = ZERO;
@@ -55,7 +55,7 @@ function valued({ terms, isStrict }, values) {
   return { by, constant, isStrict };
 }
 
-// The row as `to - from <= bound`, if it is that; time 0 is at zero.
+// The row as `to - from <= bound`, if it has this form; time 0 is zero.
 function asDifference({ by, constant, isStrict }) {
   if (by.size > 2) return null;
   let [from, to] = [0, 0];
@@ -88,7 +88,7 @@ function tighten(matrix, zero) {
   return true;
 }
 
-// The system with its rows read, once for all values.
+// The system with parsed rows, shared by all values.
 function readSystem({ times: labels, network, requirements }) {
   return {
     count: labels.length,
@@ -97,16 +97,16 @@ function readSystem({ times: labels, network, requirements }) {
   };
 }
 
-// What comes of these values:
-//   { works: true, earliest, latest }   times as numbers for drawing; `latest` is null where nothing limits it
-//   { works: false, words }             and why not
-//   { works: null, words }              happenings may come in another order, of which nothing is known here
+// Result for these values:
+//   { works: true, earliest, latest }   times as numbers for drawing; `latest` is null if it is unbounded
+//   { works: false, words }             with the reason in words
+//   { works: null, words }              undecided, because happenings may come in another order
 function checkPoint(system, values) {
   const network = system.network.map((it) => valued(it.read, values));
   const cases = system.requirements.map((it) => it.cases.map((rows) => rows.map((row) => valued(row, values))));
 
-  // Bounds as whole numbers: `scale` times the bound, less one if the bound itself is excluded. So many of them
-  // add up to less than the least difference between two bounds.
+  // Bounds as whole numbers: `scale` times the bound, minus one if the bound itself is excluded. The scale is so large
+  // that the subtracted ones of a path add up to less than the least difference between two bounds.
   const differences = [...network, ...cases.flat(2)].map(asDifference).filter(Boolean);
   const common = differences.reduce((least, { bound: [, b] }) => (least / gcd(least, b)) * b, 1n);
   const strictness = BigInt(system.count + 4);
@@ -117,7 +117,7 @@ function checkPoint(system, values) {
   const whole = isSmall ? Number : (it) => it;
   const zero = whole(0n);
   const weight = (difference) => whole(exact(difference));
-  // Back again: the bound, and whether it is excluded.
+  // Converts back: the bound, and `true` if it is excluded.
   const bound = (it) => {
     const value = BigInt(it);
     let up = value / strictness;
@@ -150,8 +150,8 @@ function checkPoint(system, values) {
     latest: all[0].map((it) => (it === null ? null : toNumber(bound(it).value))),
   };
 
-  // Whether all rows hold at once in some schedule. Only the times in them matter, and what the network says of
-  // these is the greatest difference of each two.
+  // Returns true if all rows hold at once in some schedule. Only the times in the rows matter; the network restricts them
+  // by the greatest difference of each pair.
   function isPossible(rows) {
     const others = [], assumed = [];
     for (const row of rows) {
@@ -175,9 +175,9 @@ function checkPoint(system, values) {
   }
 }
 
-// Whether differences within `bounds` (of one place and another) satisfy the rows, too.
+// Returns true if some differences within `bounds` (for each pair of places) also satisfy the rows.
 function hasSolution(bounds, rows, places) {
-  // Places at a fixed distance are one variable; the first, time zero, is none.
+  // Places at a fixed distance share one variable; the first place, time zero, has no variable.
   const leader = bounds.map((_, i) => i), offset = bounds.map(() => ZERO);
   for (let i = 0; i < bounds.length; i++) {
     for (let first = 0; first < i; first++) {
@@ -191,8 +191,8 @@ function hasSolution(bounds, rows, places) {
   const columns = new Map();
   for (const own of leader) if (own !== 0 && !columns.has(own)) columns.set(own, columns.size);
   const count = columns.size;
-  // Each constraint is coefficients and a greatest value; the last coefficient is that of the margin by which strict
-  // ones hold, which is to be as large as possible.
+  // Each constraint has coefficients and an upper bound. The last coefficient is that of the margin of strict
+  // constraints, which is maximized.
   const constraints = [];
   const constraint = (terms, most, isStrict) => {
     const line = Array(count + 1).fill(ZERO);
@@ -215,10 +215,10 @@ function hasSolution(bounds, rows, places) {
   return margin !== null && (!isStrict || sign(margin) > 0);
 }
 
-// The greatest value of the last of `count` variables, none of them negative, under constraints; null if they
-// contradict each other. The simplex method with Bland's rule, which always ends.
+// Returns the greatest value of the last of `count` nonnegative variables under constraints; null if these
+// contradict each other. Simplex method with Bland's rule, which always terminates.
 function greatestLast(constraints, count) {
-  // Columns: the variables, then one that makes anything possible as long as it is not 0, then the right side.
+  // Columns: the variables, the artificial variable, the right side.
   const helper = count, right = count + 1;
   const rows = constraints.map(({ line, most }) => [...line, negated(ONE), most]);
   const basic = rows.map((_, index) => count + 1 + index), free = Array.from({ length: count + 1 }, (_, index) => index);
@@ -276,7 +276,7 @@ function greatestLast(constraints, count) {
   return negated(goals[1][right]);
 }
 
-// What does not fit into what: the bounds on a cycle that add up to less than nothing.
+// Describes the conflict: the bounds of a cycle with a negative sum.
 function conflict(count, edges, zero) {
   const least = Array(count).fill(zero), from = Array(count).fill(null);
   let last = null;

@@ -1,4 +1,4 @@
-// A run at one moment: what was running, what was decided last, what was true.
+// A run at one moment: the running actions, the last decision, and the true facts.
 
 const MOST_FACTS = 300;
 
@@ -55,7 +55,7 @@ function scrubView(chart, textOf, onTime) {
     onTime(time, isMoved);
   }
 
-  // A list that stays open or closed as the reader left it.
+  // A list that keeps its open or closed state.
   const open = new Map();
   function fold(list, one, many) {
     const more = list.length > MOST_FACTS ? [element("li", {}, `and ${list.length - MOST_FACTS} more`)] : [];
@@ -73,7 +73,7 @@ function scrubView(chart, textOf, onTime) {
         element("button", { type: "button", onclick: () => go(1) }, "later")),
       slider),
     now);
-  // A reader who is at the end stays there when there is more.
+  // If the slider is at the end, it stays there when new data arrives.
   const chosen = () => (Number(slider.value) < last ? { time: Number(slider.value) } : null);
   const choose = (before) => { slider.value = before.time; };
   return { node, show: () => show(Number(slider.value), false), chosen, choose };

@@ -1,4 +1,4 @@
-// A slider for each quantity that may deviate: whether the plan still works, what moves, what breaks first.
+// A slider for each quantity that may deviate: shows whether the plan works, the changed times, and the first violated condition.
 
 function slidersView(section, textOf, onTimes, onValues) {
   const system = readSystem(section.system);
@@ -12,7 +12,7 @@ function slidersView(section, textOf, onTimes, onValues) {
   const limits = element("p", { class: "note", id: "limits", "aria-live": "polite" });
   let touched = -1, timer = null;
 
-  // The value of a slider as a text, and as the number that it stands for.
+  // The value of a slider as a text, and as a number.
   const decimal = (value) => rounded(toNumber(value), 1e-6);
   const inputs = own.map((it, index) => {
     const input = element("input", { type: "range", id: `slider-${index}`, min: it.from, max: it.to, step: it.step, "data-slider": it.name,
@@ -55,7 +55,7 @@ function slidersView(section, textOf, onTimes, onValues) {
     if (touched >= 0 && found.works !== null) timer = setTimeout(describeLimits, 150);
   }
 
-  // Starts and ends that come at another time than planned.
+  // Starts and ends whose times differ from the planned ones.
   function describeMoves(found) {
     if (!found.works || !planned.works) { moved.replaceChildren(); return; }
     const moves = section.bars.map(([start, end], bar) => {
@@ -71,7 +71,7 @@ function slidersView(section, textOf, onTimes, onValues) {
       element("table", { id: "moves" }, element("thead", {}, element("tr", {}, ...heads)), element("tbody", {}, ...rows))));
   }
 
-  // How far the slider that was touched last can go with the others where they are, and what breaks there.
+  // The range of the slider moved last, with the others fixed, and the condition that limits it.
   function describeLimits() {
     const quantity = own[touched].quantity;
     if (!checkPoint(system, values).works) { limits.textContent = ""; return; }

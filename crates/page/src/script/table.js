@@ -1,4 +1,4 @@
-// Tables: filtered as one types, sorted by a column, and never more rows in the page than are asked for.
+// Tables: filtered while the user types, sorted by a column, with no more rows in the page than requested.
 
 const ROWS = 200;
 
@@ -81,7 +81,7 @@ function tableView(table, textOf, onBar, onOpen) {
     plain.length > 8 ? element("div", { class: "controls" }, search, count, before, after, more) : null,
     box);
 
-  // The row of a moment; somebody who goes there sees the rows around it.
+  // Shows the row of a moment, with the rows around it.
   function at(time, isMoved) {
     current = lastAt(table.times, time);
     const position = shown.indexOf(current);

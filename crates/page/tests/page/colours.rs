@@ -1,4 +1,4 @@
-//! Checks that adjacent colours on a page can be distinguished, also by colour-blind users.
+//! Checks that adjacent colours on a page can be distinguished, even by colour-blind users.
 //!
 //! Colour blindness is simulated as in Machado, Oliveira & Fernandes ("A physiologically-based
 //! model for simulation of color vision deficiency", TVCG 2009, table 1, severity 1). The

@@ -188,7 +188,7 @@ fn known(pieces: &[Piece<'_>], vocabulary: &Vocabulary) -> Option<Range<usize>> 
     })
 }
 
-/// Returns `true` for a word with a digit that is no name of the task: `3`, `12:30`, `t1`.
+/// Returns `true` for a word with a digit that is not a name of the task: `3`, `12:30`, `t1`.
 fn is_numbered(word: &str, vocabulary: &Vocabulary) -> bool {
     word.contains(char::is_numeric)
         && vocabulary.object(word).is_none()

@@ -21,7 +21,8 @@ pub enum LineKind {
     Noise,
     /// Actions with times.
     Timed,
-    /// A line that begins like an action with a time. The domain decides if it is one.
+    /// A line that begins like an action with a time. Whether it is an action depends on the names
+    /// in the domain.
     Broken,
     /// Actions without times: a classical plan, or something else in parentheses.
     Untimed,

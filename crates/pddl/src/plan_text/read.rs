@@ -33,7 +33,7 @@ const EXPECTED: &str = "expected `time: (action argument …) [duration]`";
 ///
 /// # Errors
 /// If actions, objects, types or numbers do not fit the task, if a line cannot be read, or if there
-/// is no action although the goal does not hold yet.
+/// is not an action although the goal does not hold yet.
 pub fn read_plan(
     source: &Source,
     task: &Task,

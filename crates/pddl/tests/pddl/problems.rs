@@ -35,7 +35,7 @@ fn timed_initials_that_contradict_each_other_at_one_time_are_refused() {
         "(at 10 (not (lit))) (at 20 (= (level) 1)) (at 10.0 (lit))"
     ));
     assert!(!is_read("(at 10 (= (level) 1)) (at 10 (= (level) 2))"));
-    // Repetition is no contradiction, nor is a change at another time.
+    // Repetition is not a contradiction, nor is a change at another time.
     assert!(is_read(
         "(at 10 (lit)) (at 10 (lit)) (at 10.001 (not (lit)))"
     ));

@@ -14,7 +14,7 @@ use crate::stn_plan::{Bound, Constraint, Node, NodeId, Reason, StnPlan};
 /// the plan, the plan is returned unchanged.
 ///
 /// The result does not depend on the schedule, but the running time does. If actions take time in
-/// the schedule, the constraints that imply a given one are close to it, also in a long plan. If
+/// the schedule, the constraints that imply a given one are close to it, even in a long plan. If
 /// nothing takes time, each constraint has to be compared with the whole plan.
 #[must_use]
 pub fn without_implied(mut plan: StnPlan, times: &Schedule) -> StnPlan {

@@ -34,7 +34,7 @@ fn duration_set_to(plan: &StnPlan, constraint: &Constraint, id: ParameterId) -> 
     plan.duration_of(constraint)
 }
 
-/// Removes the domain's duration constraints from all instances whose duration is a parameter, also
+/// Removes the domain's duration constraints from all instances whose duration is a parameter, even
 /// if one parameter is the duration of several.
 pub(super) fn free_durations(plan: &mut StnPlan, kinds: &[ParameterKind]) {
     let free: Vec<InstanceId> = plan

@@ -6,7 +6,7 @@
 //!          [--set NAME=VALUE]… [--without TECHNIQUE]… [--search NAME] FOLDER|DOMAIN PROBLEM…
 //! ```
 //!
-//! FOLDER holds a `manifest.csv`, whose first line names its columns: `domain`, `instance`,
+//! FOLDER contains a `manifest.csv`, whose first line names its columns: `domain`, `instance`,
 //! `domain_file` and `problem_file` are required, `collection` is optional. `--only` keeps the
 //! lines that contain one of the texts, and `--every` every Kth of the instances of a domain with
 //! durative actions. With a domain and problems instead, these are run. With `--plans`, plans are

@@ -144,7 +144,7 @@ pub enum Answer {
     NoneFound {
         /// Reason for the end of the search.
         stopped: Stopped,
-        /// `true` if plans were excluded with self-overlap.
+        /// `true` if plans with self-overlap were excluded.
         without_self_overlap: bool,
         /// Statistics.
         counts: Counts,

@@ -25,10 +25,11 @@ use placement::{insert, keep_within, place_known_end, place_timed, project_past,
 pub(crate) enum Step {
     /// Starts the action, or applies it if it is instantaneous.
     Start(u32),
-    /// Starts the action and ends it before any other happening, in the order of happenings.
+    /// Starts the action and ends it. In the sequence of happenings, no other happening comes in
+    /// between.
     Compressed(u32),
-    /// Starts the envelope, applies its content, and ends the envelope before any other happening,
-    /// in the order of happenings.
+    /// Starts the envelope, applies its content, and ends the envelope. In the sequence of
+    /// happenings, no other happening comes in between.
     Macro(u32),
     /// Ends the running action at that index.
     End(u32),

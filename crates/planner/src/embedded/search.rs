@@ -105,7 +105,8 @@ pub(crate) struct Search<'a> {
     pub(crate) expanded: u64,
     pub(crate) generated: u64,
     pub(crate) evaluated: u64,
-    /// Number of states regenerated for rejected candidates: see [`count_rejected`](Search::waste).
+    /// Number of states regenerated for rejected candidates: see
+    /// [`count_rejected`](Search::count_rejected).
     rejected_work: u64,
     pub(crate) memory: usize,
 }

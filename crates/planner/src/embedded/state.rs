@@ -269,7 +269,7 @@ impl State {
     }
 
     /// Returns `true` if all settled happenings were no later than in the other state, and the
-    /// unsettled ones can be as early. Both must be discretely the same.
+    /// unsettled ones can be as early. Precondition: the two states differ only in times.
     pub(crate) fn has_no_later_annotations_than(&self, other: &Self) -> bool {
         if self.settled_end > other.settled_end {
             return false;

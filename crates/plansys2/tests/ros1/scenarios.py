@@ -242,7 +242,7 @@ def play(number, scenario, version, messages):
             stage.code = stage.out = stage.errors = None
             scenario(stage)
             went_well, said = True, "ok"
-        except Exception as error:  # every mistake is told, with what was said on stage
+        except Exception as error:  # each failure is reported with the messages of the scenario
             went_well = False
             line = error.__traceback__.tb_next
             said = f"WRONG: {type(error).__name__}: {error} at line {line.tb_lineno if line else '?'}\n{stage}"

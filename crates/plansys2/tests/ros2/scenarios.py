@@ -516,7 +516,7 @@ def play(number, scenario, name, world):
         try:
             scenario(stage)
             went_well, said = True, "ok"
-        except Exception as error:  # every mistake is told, with what was said on stage
+        except Exception as error:  # each failure is reported with the messages of the scenario
             went_well = False
             said = f"WRONG: {type(error).__name__}: {error} at line {error.__traceback__.tb_next.tb_lineno}\n{stage}"
         if went_well and sys.argv[3:]:

@@ -1,4 +1,4 @@
-//! The current order with cached data for the next decisions: [`Following`].
+//! The current order with cached data for the next decisions: [`OrderTracker`].
 
 use elbowroom_plan::Node;
 

@@ -72,7 +72,7 @@ pub(crate) fn is_derived(task: &Task, fact: FactId) -> bool {
     fact < FactId::FIRST_FREE && task.is_derived(fact)
 }
 
-/// Calls `visit` for each basic fact and memory that the condition reads, also through rules.
+/// Calls `visit` for each basic fact and memory that the condition reads, including through rules.
 pub(crate) fn visit_facts(task: &Task, condition: &Condition, visit: &mut impl FnMut(FactId)) {
     condition.visit_facts(&mut |fact| {
         if is_derived(task, fact) {

@@ -311,7 +311,7 @@ fn breaks(change: &Change, condition: &Condition) -> bool {
     }
 }
 
-/// Returns the number of sets of at most [`MOST_RUNNING`] of these actions.
+/// Returns the number of sets of at most [`MAX_RUNNING`] of these actions.
 fn sets(actions: usize) -> usize {
     let mut ways: usize = 1;
     let mut sum: usize = 1;

@@ -22,8 +22,8 @@ impl Queue {
         ]
     }
 
-    /// Returns the ranks to examine for an end: all of them in a short queue. In a long one, where
-    /// each end takes its best rank, only candidates for the best one.
+    /// Returns the ranks to examine for an end. In a short queue these are all ranks. In a long
+    /// queue, each end takes its best rank, so only the candidates for the best rank are returned.
     ///
     /// Probabilities decay, so shares are log-convex in the rank, except for the first happening
     /// and where ends begin to need starts. The best rank is at an end of one of these pieces.

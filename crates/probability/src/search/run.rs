@@ -278,8 +278,8 @@ impl<'s, 'w> Run<'s, 'w> {
         next
     }
 
-    /// Adds a happening to all data except the rooms. Returns the bound of all continuations, or
-    /// `None` if the happening is impossible or the bound is not good enough. With `is_open`,
+    /// Adds a happening to all data except the time slacks. Returns the bound of all continuations,
+    /// or `None` if the happening is impossible or the bound is not good enough. With `is_open`,
     /// another happening has to follow at the same moment, unless nothing needs that.
     fn push(&mut self, node: NodeId, is_open: bool) -> Result<Option<Bound>, TooCoupled> {
         let model = self.model;

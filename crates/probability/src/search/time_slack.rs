@@ -18,7 +18,7 @@ use crate::search_state::SearchState;
 
 pub(crate) use suffixes::{FirstWindow, Suffixes};
 
-/// Rooms of an order, after each of its happenings.
+/// Projected networks ([`TimeSlack`]) of an order, one after each of its happenings.
 #[derive(Clone, Debug)]
 pub(super) struct TimeSlacks<'s> {
     separations: &'s Separations,
@@ -45,7 +45,7 @@ pub(super) struct TimeSlack {
 }
 
 impl<'s> TimeSlacks<'s> {
-    /// Returns the present room; `None` if the running actions leave no schedule.
+    /// Returns the projection at present; `None` if the running actions leave no schedule.
     pub(super) fn new(separations: &'s Separations, circumstances: &SearchState) -> Option<Self> {
         let now = &circumstances.now;
         let mut room = TimeSlack {
@@ -148,8 +148,8 @@ impl<'s> TimeSlacks<'s> {
         Some(room)
     }
 
-    /// Returns the relevant part of the present room, with or without absolute times, with its
-    /// points sorted. `None` if no part is relevant.
+    /// Returns the relevant part of the present projection, with or without absolute times, with
+    /// its points sorted. `None` if no part is relevant.
     pub(super) fn relevant_slack(&self, has_deadlines: bool) -> Option<TimeSlack> {
         let room = self.last();
         let is_end = |point: &Point| matches!(point, Point::End(_));

@@ -10,7 +10,7 @@ use crate::search_state::SearchState;
 
 /// The whole network of an order, happening by happening.
 ///
-/// The search itself needs less, and uses a faster method ([`super::room::TimeSlacks`]).
+/// The search itself needs less, and uses a faster method ([`super::time_slack::TimeSlacks`]).
 #[derive(Clone, Debug)]
 pub(super) struct Timing<'s> {
     separations: &'s Separations,

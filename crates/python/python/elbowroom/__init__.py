@@ -1,4 +1,4 @@
-"""Elbowroom: how far a temporal plan may deviate, and what to do when it does.
+"""Elbowroom: computes how far a temporal plan may deviate, and executes it under that guarantee.
 
     >>> import elbowroom
     >>> problem = elbowroom.read(DOMAIN, PROBLEM)
@@ -7,8 +7,8 @@
     'envelope'
 
 Times and amounts are exact: :class:`fractions.Fraction`, and ``math.inf`` where there is no limit.
-In a notebook, answers show themselves as tables; ``.to_pandas()`` and ``.to_polars()`` make data
-frames of them, ``.plot()`` draws them.
+Notebooks display answers as tables. ``.to_pandas()`` and ``.to_polars()`` convert them to data
+frames, ``.plot()`` draws them.
 """
 
 from __future__ import annotations
@@ -63,17 +63,17 @@ __version__ = _native.__version__
 
 
 class ExecutorInfo(NamedTuple):
-    """An executor, before there is one."""
+    """Description of an available executor."""
 
     name: str
     argument: str | None
-    """What the number after its name and a colon means, if it takes one."""
+    """The meaning of the number after its name and a colon, if it takes one."""
     summary: str
     source: str
 
 
 def executors() -> list[ExecutorInfo]:
-    """Every executor that :meth:`Problem.run` knows.
+    """Returns the executors that :meth:`Problem.run` supports.
 
     >>> import elbowroom
     >>> "guarded" in [executor.name for executor in elbowroom.executors()]
@@ -83,7 +83,7 @@ def executors() -> list[ExecutorInfo]:
 
 
 def envelope(problem: Any, plan: Any, **options: Any) -> Envelope:
-    """The envelope of a plan; also of unified-planning's problems and plans.
+    """Returns the envelope of a plan, also for problems and plans of unified-planning.
 
     Options and errors are those of :meth:`Problem.envelope`.
     """

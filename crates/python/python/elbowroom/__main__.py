@@ -9,7 +9,7 @@ from . import _native
 
 
 def main() -> int:
-    """Runs the command with this program's arguments; the exit code."""
+    """Runs the command with this program's arguments. Returns the exit code."""
     # By default, Python handles Ctrl-C only after native code has returned.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     program, *arguments = sys.argv

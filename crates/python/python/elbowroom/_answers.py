@@ -1,7 +1,7 @@
-"""Answers: what the questions of a :class:`~elbowroom.Problem` give back.
+"""Answers: the results of the methods of a :class:`~elbowroom.Problem`.
 
 Each holds the document that the command prints with ``--json`` (``.document``, described in
-``docs/formats``), with its exact numbers as fractions, and offers what people ask of it.
+``docs/formats``), with its exact numbers as fractions, and has properties for the most important parts.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ class Step(NamedTuple):
     """An action of a plan."""
 
     start: Fraction
-    """When it starts."""
+    """The start time."""
     action: str
     """Its name: ``(drive rover depot shelf)``."""
     duration: Fraction | None
-    """How long it takes; ``None`` for an instantaneous action."""
+    """The duration; ``None`` for an instantaneous action."""
 
 
 class Plan(Table):
@@ -41,7 +41,7 @@ class Plan(Table):
         self.steps: list[Step] = list(steps)
         """The actions, by start time."""
         self.document: dict[str, Any] = document
-        """The answer of the planner; empty for a plan from elsewhere."""
+        """The answer of the planner; empty for a plan that no planner returned."""
 
     @classmethod
     def of(cls, document: dict[str, Any]) -> Plan:
@@ -51,7 +51,7 @@ class Plan(Table):
 
     @property
     def makespan(self) -> Fraction:
-        """When the last action ends."""
+        """The end time of the last action."""
         return max((s.start + (s.duration or 0) for s in self.steps), default=Fraction(0))
 
     @property
@@ -62,7 +62,7 @@ class Plan(Table):
 
     @property
     def stop(self) -> str | None:
-        """Why the search ended: ``"first plan"``, ``"time limit"``, ``"cancelled"``, …"""
+        """The reason for the end of the search: ``"first plan"``, ``"time limit"``, ``"cancelled"``, …"""
         stop: str | None = self.document.get("stop")
         return stop
 
@@ -91,7 +91,7 @@ class Plan(Table):
         return html_table(("start", "action", "duration"), rows, caption)
 
     def plot(self, envelope: Envelope | None = None, ax: Axes | None = None) -> Axes:
-        """A Gantt chart; with an envelope, each bar has the band in which its end may lie.
+        """Draws a Gantt chart. With an envelope, each bar has a band: the possible times of its end.
 
         Raises:
             ImportError: if matplotlib is not installed.
@@ -100,7 +100,7 @@ class Plan(Table):
 
 
 class NoPlan:
-    """There is no plan, or none was found; it is false in conditions."""
+    """Answer without a plan: none exists, or none was found. It is false in conditions."""
 
     def __init__(self, document: dict[str, Any]) -> None:
         self.document: dict[str, Any] = document
@@ -108,12 +108,12 @@ class NoPlan:
 
     @property
     def is_proved(self) -> bool:
-        """Whether a certificate (``document["certificate"]``) proves that there is none. Otherwise none was found."""
+        """``True`` if a certificate (``document["certificate"]``) proves that no plan exists; ``False`` if none was found."""
         return bool(self.document["answer"] == "no plan")
 
     @property
     def reason(self) -> str:
-        """Why there is none, or why none was found."""
+        """The reason why no plan exists, or why none was found."""
         return str(self.document["reason"])
 
     def __bool__(self) -> bool:
@@ -127,17 +127,17 @@ class Violation(NamedTuple):
     """The first violation in a plan."""
 
     time: Fraction
-    """When."""
+    """The time of the violation."""
     action: str | None
-    """In which action; ``None`` if it is the goal that does not hold."""
+    """The action; ``None`` if the goal does not hold."""
     step: int | None
     """The position of that action in the plan, from 0."""
     message: str
-    """All of it, in words."""
+    """The whole description, in words."""
 
 
 class Margin(NamedTuple):
-    """How close a comparison of numbers came to failing."""
+    """Margin of a comparison of numbers: how close it came to failing."""
 
     condition: str
     when: str
@@ -148,20 +148,20 @@ class Margin(NamedTuple):
 
 
 class Verdict(Table):
-    """Whether a plan is valid; true in conditions if it is."""
+    """Verdict on a plan; true in conditions if the plan is valid."""
 
     def __init__(self, document: dict[str, Any]) -> None:
         self.document: dict[str, Any] = document
-        """The answer as the command has it."""
+        """The answer as the document that the command prints."""
 
     @property
     def is_valid(self) -> bool:
-        """Whether the plan works."""
+        """``True`` if the plan is valid."""
         return bool(self.document["answer"] == "valid")
 
     @property
     def makespan(self) -> Fraction | None:
-        """When the last action ends, if the plan works."""
+        """The end time of the last action, if the plan is valid."""
         makespan: Fraction | None = self.document.get("makespan")
         return makespan
 
@@ -179,11 +179,11 @@ class Verdict(Table):
 
     @property
     def values(self) -> dict[str, Fraction]:
-        """The value of each numeric fluent at the end, if the plan works."""
+        """The value of each numeric fluent at the end, if the plan is valid."""
         return {it["fluent"]: it["value"] for it in self.document.get("values", [])}
 
     def rows(self) -> list[Margin]:
-        """How close each comparison came to failing."""
+        """The margins of all comparisons."""
         return [Margin(**it) for it in self.document.get("margins", [])]
 
     def _fields(self) -> Sequence[str]:
@@ -222,19 +222,19 @@ class Constraint(NamedTuple):
 
 
 class Stn(Table):
-    """A plan as a simple temporal network: only the orders and bounds that it needs."""
+    """A plan as a simple temporal network with only the necessary orders and bounds."""
 
     def __init__(self, document: dict[str, Any], text: str, dot: str) -> None:
         self.document: dict[str, Any] = document
-        """The answer as the command has it."""
+        """The answer as the document that the command prints."""
         self.text: str = text
-        """As an STN plan file."""
+        """The text as an STN plan file."""
         self.dot: str = dot
-        """As a drawing for Graphviz."""
+        """The text as a graph for Graphviz."""
 
     @property
     def nodes(self) -> dict[str, str]:
-        """The time points: name, and what happens there in words."""
+        """The time points: name, and the happening in words."""
         return {node["name"]: node["what"] for node in self.document["nodes"]}
 
     @property
@@ -274,12 +274,12 @@ class Stn(Table):
 
 
 class Room(NamedTuple):
-    """How far a quantity may deviate."""
+    """A quantity with its interval."""
 
     name: str
-    """As in STN plan files."""
+    """The name, as in STN plan files."""
     quantity: str
-    """In plain words: ``duration of (drive rover depot shelf)``."""
+    """The description: ``duration of (drive rover depot shelf)``."""
     kind: str
     """``"duration"``, ``"constant"``, ``"domain"``, ``"initial"``, ``"timed"`` or ``"bound"``."""
     nominal: Fraction
@@ -289,25 +289,25 @@ class Room(NamedTuple):
     upper: Exact
     """The upper end; ``math.inf`` if there is no limit."""
     lower_limit: str | None
-    """What keeps the lower end from moving further, in words."""
+    """The constraint that limits the lower end, in words."""
     upper_limit: str | None
-    """What keeps the upper end."""
+    """The constraint that limits the upper end, in words."""
     timeout: Fraction | None
     """The time-out of the action whose duration it is: the plan works as long as the action also
-    ends before it. ``None`` if it is no duration, or if time-outs are off."""
+    ends before it. ``None`` if the quantity is not a duration, or if time-outs are off."""
 
 
 class Envelope(Table):
-    """How far each quantity of a plan may deviate while the plan still works.
+    """Envelope of a plan: an interval for each quantity, such that the plan works inside them.
 
-    True in conditions if there is an envelope, or if the box asked about lies inside it.
+    True in conditions if there is an envelope, or if the given box is inside it.
     """
 
     def __init__(self, document: dict[str, Any], makespans: dict[str, Any] | None) -> None:
         self.document: dict[str, Any] = document
-        """The answer as the command has it."""
+        """The answer as the document that the command prints."""
         self.makespans: dict[str, Exact | None] | None = makespans
-        """When the plan is done: with all quantities ``nominal``, ``at_lower``, ``at_upper``."""
+        """The end time of the plan with all quantities ``nominal``, ``at_lower`` or ``at_upper``."""
 
     @property
     def answer(self) -> str:
@@ -316,18 +316,18 @@ class Envelope(Table):
 
     @property
     def stop(self) -> str | None:
-        """Why the search ended: ``"converged"``, ``"time limit"``, ``"cancelled"``, …"""
+        """The reason for the end of the search: ``"converged"``, ``"time limit"``, ``"cancelled"``, …"""
         stop: str | None = self.document.get("stop")
         return stop
 
     @property
     def guarantee(self) -> str:
-        """The guarantee inside it: ``"weak"``, ``"dynamic"`` or ``"strong"``."""
+        """The guarantee inside the envelope: ``"weak"``, ``"dynamic"`` or ``"strong"``."""
         return str(self.document["settings"]["guarantee"])
 
     @property
     def why_not(self) -> str | None:
-        """Why the plan fails as planned, or in the box asked about."""
+        """The reason why the plan fails as planned, or in the given box."""
         if "violation" in self.document:
             return str(self.document["violation"]["message"])
         if "counterexample" in self.document:
@@ -360,7 +360,7 @@ class Envelope(Table):
         raise KeyError(f"unknown quantity {name!r}; known are {known}")
 
     def __contains__(self, values: object) -> bool:
-        """Whether values, by name, all lie in their intervals."""
+        """Returns ``True`` if all values, given by name, lie in their intervals."""
         if not isinstance(values, dict):
             return False
         return all(self[name].lower <= value <= self[name].upper for name, value in values.items())
@@ -395,7 +395,7 @@ class Envelope(Table):
         return html_table(heads, rows, f"{self.answer}, guarantee {self.guarantee}{why}")
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Each interval as a bar, with the planned value marked.
+        """Draws each interval as a bar, with the planned value marked.
 
         Raises:
             ImportError: if matplotlib is not installed.
@@ -417,13 +417,13 @@ class Execution(NamedTuple):
 
 
 class Run(Table):
-    """Outcome of executing a plan; true in conditions if the goal was reached."""
+    """Result of the execution of a plan; true in conditions if the goal was reached."""
 
     def __init__(self, document: dict[str, Any], trace: str | None) -> None:
         self.document: dict[str, Any] = document
-        """The answer as the command has it."""
+        """The answer as the document that the command prints."""
         self.trace_text: str | None = trace
-        """The trace as JSON Lines, which ``elbowroom run --replay`` plays back."""
+        """The trace as JSON Lines, which ``elbowroom run --replay`` replays."""
         self.warnings: list[str] = []
         """Warnings about the clock of a world in Python: it does not advance, jumps, or is set back."""
 
@@ -434,28 +434,28 @@ class Run(Table):
 
     @property
     def why(self) -> str | None:
-        """What there is to add to the verdict."""
+        """A further explanation of the verdict."""
         why: str | None = self.document["why"]
         return why
 
     @property
     def time(self) -> Fraction:
-        """When the run ended, by the world's clock."""
+        """The end time of the run, on the world's clock."""
         time: Fraction = self.document["time"]
         return time
 
     @property
     def replans(self) -> int:
-        """How many new plans were made, or asked for."""
+        """The number of new plans that were made or requested."""
         return int(self.document["replans"])
 
     @property
     def reasons(self) -> list[str]:
-        """Why, in words, one for each."""
+        """The reason for each new plan, in words."""
         return [str(reason["words"]) for reason in self.document["reasons"]]
 
     def trace(self) -> list[dict[str, Any]]:
-        """The record of the run, entry by entry (``docs/formats/trace.md``).
+        """Returns the entries of the run's record (``docs/formats/trace.md``).
 
         Raises:
             ValueError: if none was kept (``trace=False``).
@@ -489,7 +489,7 @@ class Run(Table):
         return html_table(("start", "action", "took", "outcome"), rows, caption)
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """A Gantt chart of what was done.
+        """Draws a Gantt chart of the executed actions.
 
         Raises:
             ImportError: if matplotlib is not installed.

@@ -1,4 +1,4 @@
-"""The run of an executive: in a thread of its own, until its orderly end."""
+"""The run of an executive: in a separate thread, until its orderly end."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ class BackgroundRun:
             self._lifecycle.request_end()
 
     def stop(self) -> Run:
-        """Stops the executive in order, within 6 s, and returns what was done.
+        """Stops the executive in order, within 6 s, and returns the run.
 
         A first and a second Ctrl-C meanwhile are raised afterwards; a third ends the run at once.
 
@@ -111,7 +111,7 @@ class BackgroundRun:
         return run
 
     def join(self, timeout: float | None = None) -> Run | None:
-        """Waits until the executive has ended. Returns what was done, or ``None`` after ``timeout`` seconds.
+        """Waits until the executive has ended. Returns the run, or ``None`` after ``timeout`` seconds.
 
         Raises:
             WorldError: if the world has failed.

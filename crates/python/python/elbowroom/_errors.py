@@ -1,4 +1,4 @@
-"""Exceptions. Every exception says what to do."""
+"""Exceptions. The message of each exception contains advice."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Diagnostic(NamedTuple):
     column: int
     """The column, from 1, in characters."""
     length: int
-    """How many characters the place spans on its line; 0 where something is missing."""
+    """Number of characters of the place on its line; 0 if something is missing there."""
 
     def __str__(self) -> str:
         advice = f"; {self.advice}" if self.advice else ""
@@ -31,7 +31,7 @@ class Diagnostic(NamedTuple):
 
 
 def diagnostics(records: str) -> list[Diagnostic]:
-    """Reads what the native module says about a text."""
+    """Reads the native module's findings about a text."""
     read: list[dict[str, Any]] = json.loads(records)
     fields = Diagnostic._fields
     return [Diagnostic(*(record[field] for field in fields)) for record in read]
@@ -53,7 +53,7 @@ class ReadError(ElbowroomError, ValueError):
     """
 
     diagnostics: list[Diagnostic]
-    """All that was found, errors and warnings, in the order of the text."""
+    """All errors and warnings, in the order of the text."""
 
     def __init__(self, message: str, records: str = "[]") -> None:
         super().__init__(message)
@@ -61,7 +61,7 @@ class ReadError(ElbowroomError, ValueError):
 
 
 class RequestError(ElbowroomError, ValueError):
-    """The request cannot be understood, or its answer is beyond exact analysis; it says why."""
+    """The request is invalid, or its answer is beyond exact analysis. The message gives the reason."""
 
 
 class UnsupportedError(ElbowroomError):
@@ -79,7 +79,7 @@ class PlannerError(ElbowroomError):
 class WorldError(ElbowroomError):
     """A world in Python has raised an exception, which is the ``__cause__``, or broke its contract.
 
-    ``run`` is what came of the run until then.
+    ``run`` is the run until then.
     """
 
     run: Any
@@ -92,7 +92,7 @@ class WorldError(ElbowroomError):
 class ExecutiveError(ElbowroomError):
     """An executive cannot be started or resumed, its journal cannot be written, or it has ended.
 
-    ``run`` is what came of the run until then, if there was one.
+    ``run`` is the run until then, if there was one.
     """
 
     run: Any
@@ -103,7 +103,7 @@ class ExecutiveError(ElbowroomError):
 
 
 class CampaignError(ElbowroomError):
-    """Parts of a campaign are missing, or could not be made; it says which."""
+    """Parts of a campaign are missing, or could not be computed. The message names them."""
 
 
 class BugError(ElbowroomError, RuntimeError):

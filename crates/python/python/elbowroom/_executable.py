@@ -42,36 +42,36 @@ class Executable:
         stop: Stop | None = None,
         **options: Any,
     ) -> Run:
-        """Executes a plan in a world: dispatches, watches, and replans.
+        """Executes a plan in a world: dispatches its actions, monitors them, and replans.
 
         Args:
-            plan: the plan to begin with; without one, one is made.
+            plan: the initial plan; by default, the planner makes one.
             world: a :class:`World` or a :class:`SteppedWorld` in Python, or a world file (``docs/formats/world.md``); without
-                one, everything goes as planned.
-            executor: who decides; :func:`elbowroom.executors` lists them.
-            planner: who makes new plans: ``"embedded"``, ``"none"``, another planner's name or
+                one, all durations and outcomes are as planned.
+            executor: the name of the executor; :func:`elbowroom.executors` lists them.
+            planner: the planner for new plans: ``"embedded"``, ``"none"``, another planner's name or
                 command line, or a function of the texts of domain and problem.
-            seed: which trajectory of a simulated world.
-            trace: whether to keep the record of the run.
-            wall_time_limit: in seconds on the wall clock; then the run ends in order.
-            progress: is told of what happens; ``True`` shows a bar.
+            seed: the random seed of a simulated world.
+            trace: ``True`` to keep the record of the run.
+            wall_time_limit: limit in seconds on the wall clock; then the run ends in order.
+            progress: receives the events of the run; ``True`` shows a bar.
             stop: a handle that ends the run in order, from any thread.
             options: further members of a run's specification, as the header of a trace has them
                 (``docs/formats/trace.md``): ``time_limit`` and ``planning_time`` in the world's
                 seconds, ``timeout`` (as in :meth:`envelope`), ``max_replans``, ``vary``,
                 ``guarantee``, ``precision``, ``running``, ``likelihoods``, ``believed`` (the world file that the executor
                 believes, for example of a world in Python), ``self_overlap``, …; and ``jobs``, the number of threads of the
-                embedded planner: 1 unless it is given, 0 for one for each processor. It changes no plan, and is no
-                part of the trace.
+                embedded planner: 1 unless it is given, 0 for one for each processor. It does not change plans, and is
+                not part of the trace.
 
         Returns:
-            What came of it; also when the goal was not reached. Ctrl-C ends the run in order: running actions are
+            The run, even if the goal was not reached. Ctrl-C ends the run in order: running actions are
             cancelled, their ends are awaited for at most 5 s, and the world's ``stop`` is called. A second Ctrl-C is
             ignored meanwhile. A third one ends the run at once.
 
         Raises:
             RequestError: if the options contradict each other.
-            WorldError: if the world raises something, which is then its cause.
+            WorldError: if the world raises an exception, which is its ``__cause__``.
 
         >>> run = problem.run(PLAN)
         >>> run.verdict, run.time
@@ -104,7 +104,7 @@ class Executable:
         trace: bool = True,
         **options: Any,
     ) -> Stepped:
-        """A run that an event loop of your own drives, step by step.
+        """Returns an execution that the caller's event loop drives step by step.
 
         Arguments and errors are those of :meth:`run`.
 

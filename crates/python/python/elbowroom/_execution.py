@@ -1,4 +1,4 @@
-"""Executions that are driven step by step, by an event loop of one's own."""
+"""Executions that an event loop of the caller drives step by step."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ from ._world import Action, Observation, passage, wire
 
 
 class Start(NamedTuple):
-    """The world is to start an action now."""
+    """Request to the world to start an action now."""
 
     action: Action
 
 
 class Cancel(NamedTuple):
-    """The world is to stop an action."""
+    """Request to the world to stop an action."""
 
     action: Action
 
 
 class Wait(NamedTuple):
-    """Time is to pass until something is observed, but not beyond ``until``; then
+    """Request to let time pass until the next observation, at most until ``until``. The answer is
     :meth:`Stepped.observe`."""
 
     until: Fraction
 
 
 class Look(NamedTuple):
-    """The run asks for these facts, to be answered by :meth:`Stepped.see`; empty if unknown."""
+    """Request to observe these facts. The answer is :meth:`Stepped.see`; empty if unknown."""
 
     facts: list[str]
     fluents: list[str]
@@ -46,13 +46,13 @@ class Over(NamedTuple):
 
 
 Next = Start | Cancel | Wait | Look | Over
-"""What an execution needs next."""
+"""The next request of an execution."""
 
 
 class Stepped:
-    """An execution that is asked what it needs next, and told what was observed.
+    """An execution whose caller performs its requests and reports observations.
 
-    It looks at no clock: time is what it is told. Made by :meth:`elbowroom.Problem.execution`.
+    It reads no clock: the caller reports the time. Created by :meth:`elbowroom.Problem.execution`.
 
     >>> execution = problem.execution(PLAN)
     >>> coming = []
@@ -77,7 +77,7 @@ class Stepped:
 
     @property
     def now(self) -> Fraction:
-        """What time it is, by the world's clock."""
+        """The present time on the world's clock."""
         return Fraction(self._native.now())
 
     def next_command(self) -> Next:
@@ -98,28 +98,28 @@ class Stepped:
         return Over(Run(document(rest[0]), rest[1]))
 
     def observe(self, now: Number, observations: Sequence[Observation] = ()) -> None:
-        """Time has passed, as :class:`Wait` has asked, and this was observed meanwhile.
+        """Answers :class:`Wait`: reports the present time and the observations since the last one.
 
         Raises:
-            RequestError: if nothing of that kind was asked for, or it cannot be understood.
+            RequestError: if there is no such request, or the answer is invalid.
         """
         self._native.observe(json.dumps(passage((now, observations))))
 
     def see(self, observations: Sequence[Observation] = ()) -> None:
-        """What was seen of that which :class:`Look` has asked for.
+        """Answers :class:`Look`: reports the observed facts and values.
 
         Raises:
-            RequestError: if nothing of that kind was asked for, or it cannot be understood.
+            RequestError: if there is no such request, or the answer is invalid.
         """
         self._native.see(json.dumps(wire(observations)))
 
     def stop(self) -> None:
         """Ends the run in order: the running actions are cancelled, and their ends are awaited.
 
-        To be followed by :meth:`next_command`, until :class:`Over`.
+        Call :meth:`next_command` afterwards, until it returns :class:`Over`.
         """
         self._native.stop()
 
     def fail(self, why: str) -> None:
-        """The world has failed; the run ends with the verdict ``"world-failed"``."""
+        """Reports that the world has failed. The run ends with the verdict ``"world-failed"``."""
         self._native.fail(why)

@@ -24,7 +24,7 @@ from ._texts import Text, named_text, seconds
 from ._world import Action, AsyncWorld, World
 
 ACCEPT_TIME = 2.0
-"""Seconds for the run to process a request. It also processes the request later."""
+"""Seconds to wait until the run has processed a request. If it takes longer, the run processes the request later."""
 
 JOURNAL_SIZE = 10_000_000
 """Length from which a journal is rotated by default, in bytes."""
@@ -71,15 +71,16 @@ class Executive(BackgroundRun):
             domain: the domain in PDDL: a path, or the text.
             problem: the problem. Its goal is the first one, with the name ``problem``.
             world: a world in Python, or a world file (``docs/formats/world.md``) for a simulation on the real clock;
-                without one, everything goes as planned. The methods of an ``AsyncWorld`` are called in the running
+                without one, all durations and outcomes are as planned. The methods of an ``AsyncWorld`` are called in the running
                 event loop.
             journal: a new file, from which :meth:`resume` continues after a crash. For worlds in Python, and for
                 ``world_process="COMMAND"``.
-            learn: a folder for logs and for ``world.toml``, the model learnt from the journal at each rest and at the end
+            learn: a folder for logs and for ``world.toml``, the model learnt from the journal when the executive is idle
+                and at the end
                 (``docs/learning.md``). ``believed=`` is the model that the executor believes.
-            executor: who decides; :func:`elbowroom.executors` lists them.
+            executor: the name of the executor; :func:`elbowroom.executors` lists them.
             planner: ``"embedded"``, another planner's name, or a command line.
-            seed: which trajectory of a simulated world.
+            seed: the random seed of a simulated world.
             epsilon: the least separation of interfering happenings.
             journal_size: the length from which the journal is rotated, in bytes.
             journal_segments: the number of earlier segments that are kept.
@@ -126,8 +127,8 @@ class Executive(BackgroundRun):
     ) -> Executive:
         """Resumes the run of a journal whose process has died.
 
-        Goals, facts and pauses count again, and nothing that the journal contains is started again. The world is asked for
-        the outcome of actions that were running (:meth:`elbowroom.World.resume`).
+        Goals, facts and pauses are restored, and no action in the journal is started again. The world reports the outcomes of
+        actions that were running (:meth:`elbowroom.World.resume`).
 
         Args:
             journal: the journal.
@@ -182,15 +183,16 @@ class Executive(BackgroundRun):
         when its world does not answer; then it processes the goal later. The same holds for the other requests.
 
         Args:
-            goal: a condition, as it stands behind ``:goal``.
+            goal: a condition in PDDL, as after ``:goal``.
             name: its name. An open goal of that name is replaced.
             value: a positive number, 1 by default. If not all goals can be reached together, those with the greatest sum
                 of values are pursued.
-            deadline: by when it is to be achieved, on the world's clock.
+            deadline: the latest time at which it must be achieved, on the world's clock.
             within: the same in seconds from now.
-            release: from when on it is pursued, on the world's clock; it is queued until then.
+            release: the time from which it is pursued, on the world's clock; it is queued until then.
             after: the same in seconds from now.
-            keep: it is achieved again whenever it does not hold and no other goal is pursued, until it is cancelled.
+            keep: ``True`` for a goal that is achieved again whenever it does not hold and no other goal is pursued, until it
+                is cancelled.
             by: name of the client, for the records.
 
         Returns:
@@ -281,7 +283,7 @@ class Executive(BackgroundRun):
         return answers.status(document(self._native.state()))
 
     def goals(self) -> list[Goal]:
-        """The last 1000 goals that were closed, and the open ones."""
+        """Returns the open goals, after the last 1000 closed ones."""
         return answers.goals(document(self._native.goals()))
 
     def goal(self, name: str) -> Goal:
@@ -330,7 +332,7 @@ class Executive(BackgroundRun):
                 self._over.wait(min(left, POLL_INTERVAL))
 
     def events(self, after: int | None = None) -> Iterator[dict[str, Any]]:
-        """The entries of the trace as they come (``docs/formats/trace.md``), until the executive ends.
+        """Iterates over the entries of the trace as they are written (``docs/formats/trace.md``), until the executive ends.
 
         Args:
             after: the number of the last line that is known already: 0 for all lines that are kept, the last 2 to 4 MB;

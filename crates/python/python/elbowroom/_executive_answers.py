@@ -27,14 +27,14 @@ class Goal(NamedTuple):
     state: str
     """``"queued"`` until its release time; ``"kept"`` while a goal to keep holds, and ``"queued"`` while it does not and
     other goals are pursued; ``"pursued"``; ``"set-aside"`` while others are pursued; ``"impossible"`` if no plan exists, or ``"unplanned"`` if
-    none was found, from where the executive rests; ``"achieved"``; ``"cancelled"``; or ``"failed"`` if it was not achieved by
+    none was found, when the executive is idle; ``"achieved"``; ``"cancelled"``; or ``"failed"`` if it was not achieved by
     its deadline."""
     given: Fraction | None
-    """When it was given, by the world's clock; ``None`` if an earlier segment of the journal has it."""
+    """The time at which it was given, on the world's clock; ``None`` if an earlier segment of the journal contains it."""
     since: Fraction
-    """Since when it is in this state."""
+    """The time of the change to this state."""
     why: str | None
-    """The reason for another state than ``"pursued"`` and ``"achieved"``, if it is known."""
+    """The reason for a state other than ``"pursued"`` and ``"achieved"``, if it is known."""
 
     def __bool__(self) -> bool:
         return self.state in ("achieved", "kept")
@@ -58,17 +58,17 @@ class RunningAction(NamedTuple):
     action: str
     """The action."""
     since: Fraction
-    """When it was started."""
+    """The start time."""
     planned: Fraction | None
-    """How long it was planned to take."""
+    """The planned duration."""
     needed: Fraction | None
-    """From when on a new plan is needed if it has not ended, once that is near."""
+    """The time at which a new plan is needed if the action has not ended; given only shortly before."""
     times_out: Fraction | None
-    """When it times out and is cancelled, once that is near."""
+    """The time at which the action times out and is cancelled; given only shortly before."""
     completion: Fraction | None
-    """The part that is done, from 0 to 1, if the world has said so."""
+    """The completed part, from 0 to 1, if the world has reported it."""
     note: str | None
-    """What the world has said last about it."""
+    """The world's last note about it."""
 
 
 class Doubt(NamedTuple):
@@ -77,9 +77,9 @@ class Doubt(NamedTuple):
     name: str
     """The fact or the number."""
     since: Fraction
-    """Since when."""
+    """The start of the doubt."""
     why: str
-    """The reason, and how the doubt can be settled."""
+    """The reason, and the observations that settle the doubt."""
 
 
 class PlannedAction(NamedTuple):
@@ -88,7 +88,7 @@ class PlannedAction(NamedTuple):
     action: str
     """The action."""
     start: Fraction
-    """When it was started, or is planned to start."""
+    """The start time, or the planned one."""
     duration: Fraction | None
     """Its planned duration; ``None`` for an instantaneous action."""
     state: str
@@ -105,9 +105,9 @@ class Status(NamedTuple):
     activity: str
     """``"beginning"``, ``"planning"``, ``"executing"``, ``"paused"``, ``"resting"`` or ``"over"``."""
     why: str | None
-    """The reason, for example for a rest, if there is something to say."""
+    """The reason for the activity, for example for the idle state, if there is one."""
     unanswered: int | None
-    """For how many seconds the world has not answered, if that is more than one second."""
+    """The time for which the world has not answered, in seconds, if that is more than one second."""
     running: list[RunningAction]
     """The running actions."""
     plans: int

@@ -1,4 +1,4 @@
-"""Makes one part of an experiment, in a job of Slurm: ``job.sh`` calls it."""
+"""Computes one part of an experiment, in a job of Slurm. ``job.sh`` calls it."""
 
 import sys
 

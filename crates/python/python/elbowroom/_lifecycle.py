@@ -452,7 +452,7 @@ class CtrlC:
             try:
                 asyncio.get_running_loop().call_soon(signal.raise_signal, signal.SIGINT)
             except RuntimeError:
-                pass  # the event loop is gone
+                pass  # the event loop is closed
 
     def _receive(self, _number: int, _frame: object) -> None:
         self._is_received = True

@@ -8,14 +8,14 @@ from fractions import Fraction
 from typing import Any, TypeAlias
 
 Number: TypeAlias = int | float | str | Fraction | Decimal
-"""Accepted numbers: a float means the decimal that it is written as, 0.1 one tenth."""
+"""Accepted numbers. A float means its decimal notation: 0.1 is one tenth."""
 
 Exact: TypeAlias = Fraction | float
-"""A fraction, or ``math.inf`` or ``-math.inf``. A float is never anything else."""
+"""A fraction, or ``math.inf`` or ``-math.inf``. Floats are used for infinity only."""
 
 
 def exact(number: Number) -> Exact:
-    """A number, exactly.
+    """Converts a number to an exact one.
 
     >>> exact(0.1), exact("1/3"), exact(2), exact(float("inf"))
     (Fraction(1, 10), Fraction(1, 3), Fraction(2, 1), inf)
@@ -38,7 +38,7 @@ def exact(number: Number) -> Exact:
 
 
 def text(number: Number) -> str:
-    """A number as Elbowroom reads it.
+    """Formats a number as Elbowroom reads it.
 
     >>> text(0.1), text(5), text(float("-inf"))
     ('1/10', '5', '-inf')
@@ -47,7 +47,7 @@ def text(number: Number) -> str:
 
 
 def timeout_text(timeout: Number | str) -> str:
-    """A time-out as Elbowroom reads it: a number of seconds, or a rule.
+    """Formats a time-out as Elbowroom reads it: a number of seconds, or a rule.
 
     >>> timeout_text(60), timeout_text("10x,600")
     ('60', '10x,600')
@@ -69,7 +69,7 @@ def document(text: str) -> Any:
 
 
 def shown(number: Exact | None, digits: int = 3) -> str:
-    """A number for people: rounded to ``digits`` decimals.
+    """Formats a number for display, rounded to ``digits`` decimals.
 
     >>> from fractions import Fraction
     >>> shown(Fraction(1, 3)), shown(Fraction(5, 2)), shown(float("inf"))
@@ -85,7 +85,7 @@ def shown(number: Exact | None, digits: int = 3) -> str:
 
 
 def shown_inwards(number: Exact, is_lower: bool, digits: int = 3) -> str:
-    """An end of an interval, rounded into the interval: what is printed is promised.
+    """Formats an end of an interval, rounded into the interval, so that the guarantee covers the printed interval.
 
     >>> from fractions import Fraction
     >>> shown_inwards(Fraction(2, 3), True), shown_inwards(Fraction(2, 3), False)

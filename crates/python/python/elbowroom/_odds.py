@@ -1,4 +1,4 @@
-"""How likely a plan is to succeed: what :meth:`elbowroom.Problem.odds` gives back."""
+"""Success probability of a plan: the result of :meth:`elbowroom.Problem.odds`."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ if TYPE_CHECKING:
 
 
 class Loss(NamedTuple):
-    """A share of all worlds that is lost at one place; they and the probability add up to 1."""
+    """Share of all worlds that is lost at one place. All losses and the probability add up to 1."""
 
     at: str
     """The happening, in words; ``"the beginning"`` before the first."""
     reason: str
     """``"start"`` (the attempt fails), ``"condition"``, ``"throughout"`` or ``"goal"``."""
     condition: str | None
-    """What does not hold; ``None`` for a start that fails."""
+    """The condition that does not hold; ``None`` for a start that fails."""
     since: str | None
     """The happening that last had an effect on it; ``None``: the initial state."""
     action: str | None
@@ -38,17 +38,17 @@ class Happening(NamedTuple):
     action: str | None
     """The action; ``None`` for a timed initial."""
     what: str
-    """In words."""
+    """The description in words."""
     earliest: Fraction | None
     """The earliest time; ``None`` where there is no time for the order."""
     latest: Fraction | None
     """The latest time; ``None`` where there is no bound, or no time for the order."""
     probability_so_far: float
-    """That everything up to here succeeds."""
+    """The probability that everything up to here succeeds."""
 
 
 class ActionShare(NamedTuple):
-    """The part of an action in an order."""
+    """Contribution of an action to an order."""
 
     action: str
     """Its name."""
@@ -57,47 +57,47 @@ class ActionShare(NamedTuple):
     if_certain: float
     """The probability if it never failed."""
     if_retried: float | None
-    """The probability if failed attempts to start it were repeated; ``None``: too long to say."""
+    """The probability if failed attempts to start it were repeated; ``None`` if the computation would take too long."""
     if_done_again: float | None
-    """The probability if it were started again at once whenever its end fails; ``None``: its end does not
-    fail, or a failure may leave one thing or another behind, or it is too long to say."""
+    """The probability if it were started again at once whenever its end fails; ``None`` if its end does not
+    fail, if a failure has several possible outcomes, or if the computation would take too long."""
 
 
 class FactShare(NamedTuple):
-    """The part of a fact that may change by itself."""
+    """Contribution of a fact that may change spontaneously."""
 
     fact: str
     """Its name."""
     if_steady: float
-    """The probability if it never changed by itself."""
+    """The probability if it never changed spontaneously."""
 
 
 class Sampled(NamedTuple):
-    """Outcome of executing the plan in samples of a world."""
+    """Results of executing the plan in samples of a world."""
 
     executor: str
-    """By whom."""
+    """The executor."""
     replans: bool
-    """Whether new plans were made."""
+    """``True`` if new plans were allowed."""
     samples: int
-    """How many there were."""
+    """The number of samples."""
     reached: int
-    """In how many the goal was reached."""
+    """The number of samples that reached the goal."""
     interval: tuple[float, float] | None
     """Wilson's 95 % interval of the probability."""
 
 
 class Odds(Table):
-    """How likely a plan is to succeed; true in conditions if that is possible at all.
+    """Success probability of a plan; true in conditions if it is positive.
 
-    Its rows are the losses: where and why the rest of the probability goes.
+    Its rows are the losses: the places and reasons of the lost probability.
     """
 
     def __init__(self, document: dict[str, Any], lattice_svg: str | None) -> None:
         self.document: dict[str, Any] = document
-        """The answer as the command has it (``docs/formats/odds-json.md``)."""
+        """The answer as the document that the command prints (``docs/formats/odds-json.md``)."""
         self.lattice_svg: str | None = lattice_svg
-        """All orders as a picture, if they were asked for and are not too many."""
+        """The picture of all orders, if it was requested and there are not too many."""
 
     @property
     def answer(self) -> str:
@@ -106,7 +106,7 @@ class Odds(Table):
 
     @property
     def why_not(self) -> str | None:
-        """Why there are no odds."""
+        """The reason for a missing probability."""
         if "violation" in self.document:
             return str(self.document["violation"]["message"])
         reason: str | None = self.document.get("reason")
@@ -129,12 +129,12 @@ class Odds(Table):
 
     @property
     def is_best(self) -> bool:
-        """Whether this is about the likeliest order that was found, not that of the plan's times."""
+        """``True`` if the answer is about the likeliest order found, ``False`` if about the order of the plan's times."""
         return bool(self._order.get("is_best"))
 
     @property
     def is_proven(self) -> bool | None:
-        """Whether no order of the plan is likelier; ``None`` if that was not asked."""
+        """``True`` if no order of the plan is likelier; ``None`` if this was not requested."""
         proven: bool | None = self._order.get("is_proven")
         return proven
 
@@ -148,26 +148,26 @@ class Odds(Table):
 
     @property
     def actions(self) -> list[ActionShare]:
-        """The part of each action, in order of their starts."""
+        """The contribution of each action, in order of their starts."""
         return [ActionShare(**it) for it in self._order.get("actions", [])]
 
     @property
     def facts(self) -> list[FactShare]:
-        """The facts that may change by themselves to the order's harm, the worst first."""
+        """The facts whose spontaneous changes reduce the probability, the largest reduction first."""
         return [FactShare(**it) for it in self._order.get("facts", [])]
 
     @property
     def gains(self) -> dict[str, float | None]:
-        """The probability with another order, another plan, or actions chosen as the state asks.
+        """The probability with another order, with another plan, or with actions chosen by the observed state.
 
-        ``None`` where it cannot be calculated; ``.document["gains"]`` says why.
+        ``None`` if it cannot be computed; ``.document["gains"]`` has the reason.
         """
         found: dict[str, dict[str, Any] | None] = self.document.get("gains", {})
         return {name: (it or {}).get("probability") for name, it in found.items()}
 
     @property
     def executed(self) -> list[Sampled]:
-        """Outcome of executing the plan in samples of the world, if one was given."""
+        """Results of executing the plan in samples of the world, if one was given."""
         return [
             Sampled(
                 it["executor"],
@@ -180,7 +180,7 @@ class Odds(Table):
         ]
 
     def rows(self) -> list[Loss]:
-        """Where the probability is lost."""
+        """The losses."""
         return [
             Loss(*(it.get(field) for field in Loss._fields)) for it in self._order.get("losses", [])
         ]
@@ -207,7 +207,7 @@ class Odds(Table):
         return html_table(("share", "at", "what does not hold", "since"), rows, caption)
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """How the probability falls, happening by happening.
+        """Draws the decrease of the probability, happening by happening.
 
         Raises:
             ImportError: if matplotlib is not installed.

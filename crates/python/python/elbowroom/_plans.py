@@ -10,16 +10,16 @@ from ._numbers import document
 
 
 class Plans(Iterator[Plan]):
-    """Plans as they are found, each better than the one before: by the problem's metric or, without one, by makespan.
+    """Iterator of plans as they are found, each better than the previous one by the problem's metric, or by makespan without one.
 
-    The search goes on between them, until the time limit or until nothing is left to search.
+    The search continues between the plans, until the time limit or until it is exhausted.
     """
 
     def __init__(self, native: _native.Plans) -> None:
         self._native = native
         self.answer: Plan | NoPlan | None = None
-        """Once there are no more: the last plan again, with why the search ended (:attr:`Plan.stop`), or why
-        there is none."""
+        """After the last plan: the last plan again, with the reason for the end of the search (:attr:`Plan.stop`), or the
+        answer without a plan."""
         self._last: Plan | None = None
 
     def __next__(self) -> Plan:
@@ -43,7 +43,7 @@ class Plans(Iterator[Plan]):
         return plan
 
     def close(self) -> None:
-        """Ends the search. It ends by itself when nothing refers to this any more."""
+        """Ends the search. It also ends when the last reference to this object is dropped."""
         self._native.stop()
 
 

@@ -18,7 +18,7 @@ _COLOURS = {"succeeded": _BAR, "failed": "#c0504d", "cancelled": "#999999", None
 
 
 def axes(ax: Axes | None, rows: int) -> Axes:
-    """The given axes, or new ones with ``rows`` rows."""
+    """Returns the given axes, or new ones with ``rows`` rows."""
     if ax is not None:
         return ax
     try:
@@ -39,9 +39,9 @@ def _lanes(ax: Axes, labels: list[str], unit: str) -> Axes:
 
 
 def gantt(plan: Plan, envelope: Envelope | None, ax: Axes | None) -> Axes:
-    """A lane for each action; in the band its end may lie, if it starts when planned.
+    """Draws a lane for each action. Its band contains the possible times of its end, if it starts as planned.
 
-    A band that leads beyond three times the makespan is cut there, and says so.
+    A band that is longer than three times the makespan is cut there and marked.
     """
     ax = axes(ax, len(plan.steps))
     rooms: dict[str, list[Any]] = {}
@@ -64,7 +64,7 @@ def gantt(plan: Plan, envelope: Envelope | None, ax: Axes | None) -> Axes:
 
 
 def intervals(envelope: Envelope, ax: Axes | None) -> Axes:
-    """A lane for each quantity: its interval, and the planned value."""
+    """Draws a lane for each quantity: its interval, and the planned value."""
     rooms = envelope.rows()
     ax = axes(ax, len(rooms))
     finite = [float(room.upper) for room in rooms if room.upper != math.inf]
@@ -79,7 +79,7 @@ def intervals(envelope: Envelope, ax: Axes | None) -> Axes:
 
 
 def executed(run: Run, ax: Axes | None) -> Axes:
-    """A lane for each start, coloured by its outcome."""
+    """Draws a lane for each start, coloured by its outcome."""
     rows = run.rows()
     ax = axes(ax, len(rows))
     last = float(run.time) or 1.0
@@ -91,7 +91,7 @@ def executed(run: Run, ax: Axes | None) -> Axes:
 
 
 def falling(odds: Odds, ax: Axes | None) -> Axes:
-    """A lane for each happening: the probability that everything has gone well so far."""
+    """Draws a lane for each happening: the probability that everything has succeeded so far."""
     happenings = odds.happenings
     ax = axes(ax, len(happenings) + 1)
     lanes = range(len(happenings) + 1)
@@ -103,7 +103,7 @@ def falling(odds: Odds, ax: Axes | None) -> Axes:
 
 
 def rates(comparison: Comparison, ax: Axes | None) -> Axes:
-    """How often each executor reached the goal, by column."""
+    """Draws the success rate of each executor, by column."""
     rows = comparison.rows()
     names = list(dict.fromkeys(row.row for row in rows))
     columns = list(dict.fromkeys(row.column for row in rows))

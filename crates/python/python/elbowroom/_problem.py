@@ -1,4 +1,4 @@
-"""Problems and the questions about them."""
+"""Problems, and the methods that answer questions about them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def read(domain: Text, problem: Text, *, epsilon: Number = "0.001") -> Problem:
         epsilon: the least separation of interfering happenings, in the problem's unit of time.
 
     Raises:
-        ReadError: if they cannot be read; it has all mistakes, with line, column and advice.
+        ReadError: if they cannot be read. It contains all errors, with line, column and advice.
         OSError: if there is no such file.
 
     >>> import elbowroom
@@ -43,7 +43,7 @@ def read(domain: Text, problem: Text, *, epsilon: Number = "0.001") -> Problem:
 
 
 class Problem(Executable):
-    """A planning problem: what :func:`read` returns. It does not change."""
+    """An immutable planning problem, returned by :func:`read`."""
 
     def __init__(
         self, native: _native.Task, found: Sequence[Diagnostic] = (), epsilon: str = "1/1000"
@@ -94,7 +94,7 @@ class Problem(Executable):
         """Reads a plan with fixed times, as planners print it.
 
         Raises:
-            ReadError: if it cannot be read, or names what the problem does not have.
+            ReadError: if it cannot be read, or contains names that the problem does not have.
             RequestError: if it is an STN plan.
 
         >>> problem.read_plan("0: (unlock office) [6]").steps
@@ -110,23 +110,23 @@ class Problem(Executable):
     def check(
         self, plan: AnyPlan, *, tolerance: Number | None = None, rules: str = "pddl"
     ) -> Verdict:
-        """Judges a plan by the semantics of PDDL 2.1.
+        """Validates a plan by the semantics of PDDL 2.1.
 
         Args:
             plan: a plan with fixed times.
-            tolerance: by how much each printed number may differ from that of a valid plan; without
-                it, by one unit of its last digit, at most 0.001; with 0, not at all. Steps
-                are exact numbers.
+            tolerance: the greatest difference of each printed number from that of a valid plan; by default
+                one unit of its last digit, at most 0.001. With 0, all numbers are exact. Steps
+                always have exact numbers.
             rules: ``"pddl"``, where the goal holds after all timed initials;
                 ``"pddl-goal-after-actions"``, where it holds after the plan's last action; or
-                ``"unified-planning"``, where nothing needs to be apart, what happens at one time reads the
-                state before, and no two actions write the same fact at one time; or
+                ``"unified-planning"``, where happenings need no separation, simultaneous happenings read the
+                state before them, and no two actions write the same fact at the same time; or
                 ``"unified-planning-with-epsilon"``, where only the last of these is added to
                 ``"pddl"``.
 
         Raises:
             ReadError: if the plan cannot be read.
-            UndecidedError: if it cannot be told whether the plan works.
+            UndecidedError: if the validator cannot decide whether the plan is valid.
 
         >>> bool(problem.check(PLAN))
         True
@@ -150,24 +150,24 @@ class Problem(Executable):
         self_overlap: bool = False,
         progress: ProgressCallback | bool | None = None,
     ) -> Plan | NoPlan:
-        """Looks for a plan.
+        """Searches for a plan.
 
         Args:
             planner: ``"embedded"``, the name of another planner, or a command line.
-            time_limit: in seconds; better plans are looked for until then.
-            first: whether the first plan is enough; by default, without a time limit.
-            memory: about how many bytes the search may use.
-            jobs: how many threads the embedded planner may use; by default, and with 0, one for
-                each processor. The plan is the same, but comes sooner.
-            self_overlap: whether a ground action may overlap itself: start again before it has ended.
-                This is about plans of the embedded planner.
-            progress: is told how far it has come; ``True`` shows a bar.
+            time_limit: limit in seconds; the search for better plans continues until then.
+            first: ``True`` to stop at the first plan; by default ``True`` without a time limit.
+            memory: approximate limit on the memory of the search, in bytes.
+            jobs: the number of threads of the embedded planner; by default, and with 0, one for
+                each processor. It does not change the plan, but more threads find it sooner.
+            self_overlap: ``True`` to allow a ground action to overlap itself: to start again before it has ended.
+                Affects only plans of the embedded planner.
+            progress: receives the progress; ``True`` shows a bar.
 
         Returns:
-            A plan, or a :class:`NoPlan`, which is false and says why. At Ctrl-C, the best so far.
+            A plan, or a :class:`NoPlan`, which is false and has the reason. After Ctrl-C, the best plan so far.
 
         Raises:
-            UnsupportedError: if the problem needs what the embedded planner does not support.
+            UnsupportedError: if the problem has a feature that the embedded planner does not support.
             PlannerError: if another planner is not known, or fails.
 
         >>> plan = problem.plan()
@@ -194,20 +194,20 @@ class Problem(Executable):
         jobs: int | None = None,
         self_overlap: bool = False,
     ) -> Plans:
-        """Looks for plans with the embedded planner, and gives each better one as soon as it is found.
+        """Searches for plans with the embedded planner, and yields each better one as soon as it is found.
 
-        The search goes on in a thread of its own between them. It ends at the time limit, when nothing is left
-        to search, or when nobody refers to what is returned any more, as after ``break``. With one thread, the
-        plans are the same each time, but for how many come within the limit.
+        The search continues in a separate thread between the plans. It ends at the time limit, when it is exhausted, or when
+        the last reference to the iterator is dropped, as after ``break``. With one thread, each call yields the same
+        plans; only their number within the limit may differ.
 
         Args:
-            time_limit: in seconds, from this call on, whatever is done between the plans.
-            memory: about how many bytes the search may use.
-            jobs: how many threads the planner may use; by default, and with 0, one for each processor.
-            self_overlap: whether a ground action may overlap itself.
+            time_limit: limit in seconds, counted from this call; it includes the time that the caller uses between the plans.
+            memory: approximate limit on the memory of the search, in bytes.
+            jobs: the number of threads of the planner; by default, and with 0, one for each processor.
+            self_overlap: ``True`` to allow a ground action to overlap itself.
 
         Raises:
-            UnsupportedError: from the loop, if the problem needs what the embedded planner does not support.
+            UnsupportedError: from the loop, if the problem has a feature that the embedded planner does not support.
 
         >>> plans = problem.plans(time_limit=10)
         >>> for plan in plans:
@@ -220,7 +220,7 @@ class Problem(Executable):
         return Plans(native)
 
     def stn(self, plan: AnyPlan) -> Stn:
-        """A plan with only the orders and bounds that it needs, as a simple temporal network.
+        """Relaxes a plan to a simple temporal network with only the necessary orders and bounds.
 
         Raises:
             RequestError: if the plan does not work.
@@ -254,38 +254,38 @@ class Problem(Executable):
         time_limit: float | None = None,
         progress: ProgressCallback | bool | None = None,
     ) -> Envelope:
-        """How far each quantity of a plan may deviate while the plan still works.
+        """Computes how far each quantity of a plan may deviate while the plan still works.
 
         Args:
             plan: a plan with fixed times, or an STN plan.
-            vary: what to leave open, as ``elbowroom envelope --vary`` reads it; all durations by
-                default.
+            vary: the quantities to leave open, in the syntax of ``elbowroom envelope --vary``; by
+                default all durations.
             controllable: actions whose durations the executor chooses.
             guarantee: ``"weak"``, ``"dynamic"`` or ``"strong"``.
             method: ``"best"``: the box whose least deviation is greatest; or ``"irr"``. By default
                 ``"best"``, but ``"irr"`` where ``precision``, ``growth`` or ``sharpen`` is given,
                 and for problems with processes or events.
-            precision: how close each end comes to its limit, in the quantity's own unit; without
-                it, a hundredth of the planned value.
+            precision: the maximum distance of each end from its limit, in the unit of the quantity; by
+                default a hundredth of the planned value.
             growth: ``"doubling"`` or ``"constant"`` steps.
-            sharpen: whether each end is moved onto its limit when the search has ended.
-            enforce: whether the dispatcher keeps to obligations that are bounds on differences.
-            contains: asks instead whether this box lies inside: ``{"dur_0": (8, 12)}``.
+            sharpen: ``True`` to move each end onto its limit after the search.
+            enforce: ``True`` if the dispatcher enforces obligations that are bounds on differences of times.
+            contains: a box to check instead of a search: ``{"dur_0": (8, 12)}``.
             timeout: the time-out of each action: a number of seconds, ``"none"``, or
                 ``"10x,600"``, as by default: 10 times the planned duration, at least 600. The
                 plan works as long as each quantity stays inside its interval and each action
                 ends before its time-out; a box beyond it is not inside.
-            most_checks: the search ends after that many box checks.
-            time_limit: in seconds; what was found until then is sound.
-            progress: is told how far it has come; ``True`` shows a bar.
+            most_checks: the maximum number of box checks.
+            time_limit: limit in seconds; the box found until then is sound.
+            progress: receives the progress; ``True`` shows a bar.
 
         Returns:
-            An :class:`Envelope`; also if the plan fails, which it says and explains. At Ctrl-C,
-            the box so far, in all of which the plan works.
+            An :class:`Envelope`. If the plan fails, it contains the reason. After Ctrl-C, it has
+            the box found so far, which is sound.
 
         Raises:
             ReadError: if the plan cannot be read.
-            RequestError: if a specification names what the plan does not have, or the plan is
+            RequestError: if a specification matches nothing in the plan, or the plan is
                 beyond exact analysis.
 
         >>> envelope = problem.envelope(PLAN, sharpen=True)
@@ -334,32 +334,32 @@ class Problem(Executable):
         time_limit: float | None = None,
         progress: ProgressCallback | bool | None = None,
     ) -> Odds:
-        """How likely a plan is to succeed, where that is lost, and what would help.
+        """Computes the success probability of a plan, where it is lost, and possible improvements.
 
         Args:
-            plan: a plan with fixed times; without one, one is made, and its likeliest order taken.
-            likelihoods: how likely facts and actions are: a path or a text
+            plan: a plan with fixed times; by default, the planner makes one, and its likeliest order is used.
+            likelihoods: the likelihoods of facts and actions: a path or a text
                 (``docs/formats/likelihoods.md``).
             world: a world file, for executing the plan in samples of it.
-            best: whether the answer is about the likeliest order, not that of the plan's times.
-            semantics: what a failed effect leaves behind: ``"paper"``, the opposite of what it should,
-                or ``"world"``, the fact as it was.
-            executors: who executes the plan in the samples; ``live`` and ``adaptable`` by default.
-            samples: how many samples.
-            seed: of the first sample; the others follow.
-            most_sequences: so many beginnings of orders are looked at for the likeliest one.
-            lattice: whether to list and draw all orders.
-            self_overlap: whether a ground action may overlap itself in plans that are made.
-            time_limit: in seconds; what was found until then is the answer.
-            progress: is told how far it has come; ``True`` shows a bar.
+            best: ``True`` for the likeliest order instead of that of the plan's times.
+            semantics: the result of a failed effect: the opposite value (``"paper"``), or the unchanged
+                fact (``"world"``).
+            executors: the executors that execute the plan in the samples; ``live`` and ``adaptable`` by default.
+            samples: the number of samples.
+            seed: the random seed of the first sample; the others follow.
+            most_sequences: the maximum number of partial orders in the search for the likeliest order.
+            lattice: ``True`` to list and draw all orders.
+            self_overlap: ``True`` to allow a ground action to overlap itself in new plans.
+            time_limit: limit in seconds; the answer contains the results until then.
+            progress: receives the progress; ``True`` shows a bar.
 
         Returns:
-            The :class:`Odds`; also if the plan fails, or has no order, which it says.
+            The :class:`Odds`. If the plan fails or has no order, they contain the reason.
 
         Raises:
             ReadError: if a text cannot be read.
-            UnsupportedError: if the likelihoods say nothing of something in the plan, or too many
-                facts hang together.
+            UnsupportedError: if the likelihoods have no entry for something in the plan, or a condition
+                couples too many facts.
 
         >>> likely = '''format = "elbowroom-likelihoods"
         ... version = 1

@@ -1,4 +1,4 @@
-"""Runs: from the arguments of a caller to the result, in the caller's thread or beside an event loop."""
+"""Runs: from the arguments of a caller to the result, in the caller's thread or in a thread next to an event loop."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ _TEXTS = (
 )  # fmt: skip
 
 _MARGIN = 1.0
-"""Further seconds before a cancelled task is left alone with a planner that blocks."""
+"""Further seconds after which a cancelled task no longer waits for a planner that blocks."""
 
 
 def run_options(
     executor: str, planner: object, seed: int, options: dict[str, Any]
 ) -> dict[str, Any]:
-    """The specification of a run, as the native module reads it."""
+    """Returns the specification of a run, as the native module reads it."""
     chosen: dict[str, Any] = {"executor": executor, "seed": seed}
     chosen["planner"] = planner if isinstance(planner, str) else "embedded"
     if not isinstance(planner, str) and options.get("jobs") is not None:
@@ -165,7 +165,7 @@ class RunRequest:
                 handle._disconnect(end)
 
     async def execute_async(self) -> Run:
-        """Executes the run in a thread beside the event loop. If the task is cancelled, the run ends in order."""
+        """Executes the run in a thread next to the event loop. If the task is cancelled, the run ends in order."""
         loop = asyncio.get_running_loop()
         over: asyncio.Future[tuple[Run, str | None]] = loop.create_future()
 

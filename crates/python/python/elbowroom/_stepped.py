@@ -12,7 +12,7 @@ from ._world import Action, Observation, World, ended, fact, started, value
 
 
 class SteppedWorld:
-    """World on a simulator that advances in steps; derive from it.
+    """Base class of worlds on simulators that advance in steps.
 
     Override :meth:`begin`, :meth:`step` and :meth:`cancel`. They report with :meth:`succeeded`, :meth:`failed`,
     :meth:`fact` and :meth:`value`. Starts and cancellations are reported automatically.
@@ -63,7 +63,7 @@ class SteppedWorld:
     def step(self, dt: float) -> Number | None:
         """Advances the simulation by ``dt`` seconds, at most :attr:`dt`.
 
-        A simulator with a fixed step returns how much time has passed.
+        A simulator with a fixed step returns the time that has passed.
         """
         raise NotImplementedError("a stepped world needs a method step(dt)")
 
@@ -112,7 +112,7 @@ class SteppedWorld:
 
 
 class SteppedAdapter(World):
-    """A stepped world as one that waits. A wait ends when ``is_to_end`` becomes true."""
+    """Adapter of a stepped world to one that waits. A wait ends when ``is_to_end`` becomes true."""
 
     def __init__(self, world: SteppedWorld, is_to_end: Callable[[], bool]) -> None:
         self._world = world

@@ -13,23 +13,23 @@ if TYPE_CHECKING:
 
 
 class Progress(NamedTuple):
-    """How far a long call has come: what a ``progress`` callback is given."""
+    """Progress of a long call: the argument of a ``progress`` callback."""
 
     stage: str
     """``"plan"``, ``"envelope"``, ``"run"`` or ``"trials"``."""
     done: int
-    """States, steps, plans or trials."""
+    """The number of states, steps, plans or trials so far."""
     total: int | None
-    """Of how many, where that is known."""
+    """The total number, if it is known."""
     detail: str
-    """More, in words; may be empty."""
+    """A further description in words; may be empty."""
 
 
 ProgressCallback = Callable[[Progress], object]
 
 
 def listener(progress: ProgressCallback | bool | None) -> Callable[..., object] | None:
-    """What the native module calls. ``True`` shows a bar of ``tqdm``."""
+    """Returns the callback for the native module. ``True`` shows a bar of ``tqdm``."""
     if progress is None or progress is False:
         return None
     if progress is True:
@@ -53,17 +53,17 @@ def listener(progress: ProgressCallback | bool | None) -> Callable[..., object] 
 
 
 def cell(value: Any) -> Any:
-    """A value as data frames can compute with it: fractions as floats."""
+    """Converts a value for data frames: fractions become floats."""
     return float(value) if isinstance(value, Fraction) else value
 
 
 def columns(rows: Sequence[tuple[Any, ...]], fields: Sequence[str]) -> dict[str, list[Any]]:
-    """Rows as columns."""
+    """Converts rows to columns."""
     return {field: [cell(row[i]) for row in rows] for i, field in enumerate(fields)}
 
 
 def to_pandas(rows: Sequence[tuple[Any, ...]], fields: Sequence[str]) -> pandas.DataFrame:
-    """Rows as a data frame of pandas; fractions become floats."""
+    """Converts rows to a data frame of pandas; fractions become floats."""
     try:
         import pandas
     except ImportError as error:
@@ -72,7 +72,7 @@ def to_pandas(rows: Sequence[tuple[Any, ...]], fields: Sequence[str]) -> pandas.
 
 
 def to_polars(rows: Sequence[tuple[Any, ...]], fields: Sequence[str]) -> polars.DataFrame:
-    """Rows as a data frame of polars; fractions become floats."""
+    """Converts rows to a data frame of polars; fractions become floats."""
     try:
         import polars
     except ImportError as error:
@@ -81,7 +81,7 @@ def to_polars(rows: Sequence[tuple[Any, ...]], fields: Sequence[str]) -> polars.
 
 
 def html_table(heads: Sequence[str], rows: Sequence[Sequence[str]], caption: str = "") -> str:
-    """A table; every text in it is escaped."""
+    """Returns an HTML table; all texts are escaped."""
     head = "".join(f"<th>{html.escape(text)}</th>" for text in heads)
     body = "".join(
         "<tr>" + "".join(f"<td>{html.escape(text)}</td>" for text in row) + "</tr>" for row in rows
@@ -91,7 +91,7 @@ def html_table(heads: Sequence[str], rows: Sequence[Sequence[str]], caption: str
 
 
 class Table:
-    """Tables: a list of named tuples, and data frames."""
+    """Base class of answers with a table: a list of named tuples, and data frames."""
 
     def rows(self) -> list[Any]:
         """The rows, as named tuples with exact fractions."""

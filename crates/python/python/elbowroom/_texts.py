@@ -12,20 +12,20 @@ from ._errors import InterruptedWarning, RequestError
 from ._numbers import Number, text
 
 Text: TypeAlias = "str | os.PathLike[str]"
-"""A path, or a text: a str with a parenthesis or a line feed in it is a text."""
+"""A path, or a text. A ``str`` with a parenthesis or a line feed is a text."""
 
 AnyPlan: TypeAlias = "Plan | Stn | Text | Iterable[tuple[Any, ...]]"
-"""A plan: what :meth:`Problem.plan` or :meth:`Problem.stn` gave, a path, a text, or steps
+"""A plan: the result of :meth:`Problem.plan` or :meth:`Problem.stn`, a path, a text, or steps
 (start, action, duration)."""
 
 PlannerCallable: TypeAlias = Callable[[str, str], "str | Plan | None"]
-"""A planner in Python: gets the texts of a domain and a problem, returns a plan, or ``None``."""
+"""A planner in Python: a function of the texts of a domain and a problem that returns a plan, or ``None``."""
 
 _LARGEST_FILE = 256 << 20
 
 
 def named_text(given: Text, what: str) -> tuple[str, str]:
-    """A text and its name for messages."""
+    """Returns a text and its name for messages."""
     if isinstance(given, str) and ("\n" in given or "(" in given or not given.strip()):
         return what, given
     if not isinstance(given, (str, os.PathLike)):
@@ -38,7 +38,7 @@ def named_text(given: Text, what: str) -> tuple[str, str]:
 
 
 def asked(planner: str | PlannerCallable) -> Callable[[str, str], str | None] | None:
-    """What the native module asks for plans, if that is in Python."""
+    """Returns the planner for the native module, if the planner is in Python."""
     if isinstance(planner, str):
         return None
     callable_ = planner
@@ -53,7 +53,7 @@ def asked(planner: str | PlannerCallable) -> Callable[[str, str], str | None] | 
 
 
 def line(step: tuple[Any, ...]) -> str:
-    """A step of a plan, as a line of its text."""
+    """Formats a step of a plan as a line of text."""
     start, action, *rest = step
     duration = rest[0] if rest else None
     lasts = "" if duration is None else f" [{text(duration)}]"
@@ -61,7 +61,7 @@ def line(step: tuple[Any, ...]) -> str:
 
 
 def box(contains: str | dict[str, tuple[Number, Number]] | None) -> str | None:
-    """A box, as the native module reads it."""
+    """Formats a box as the native module reads it."""
     if contains is None or isinstance(contains, str):
         return contains
     ends = {name: (text(lower), text(upper)) for name, (lower, upper) in contains.items()}
@@ -69,7 +69,7 @@ def box(contains: str | dict[str, tuple[Number, Number]] | None) -> str | None:
 
 
 def seconds(limit: float | None) -> float | None:
-    """A time limit, checked."""
+    """Checks a time limit."""
     if limit is None:
         return None
     given = float(limit)

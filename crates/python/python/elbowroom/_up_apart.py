@@ -1,4 +1,4 @@
-"""Plans that unified-planning's rules accept, where those of PDDL 2.1 allow more."""
+"""Adaptation of plans to the rules of unified-planning, which are stricter than PDDL 2.1 in some cases."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _MOST_MOVES = 200
 
 
 def overlaps(translated: Translation, steps: Sequence[Step]) -> bool:
-    """Whether an action overlaps itself though the problem does not allow that."""
+    """Returns ``True`` if an action overlaps itself although the problem does not allow that."""
     if translated.original.self_overlapping:
         return False
     ends: dict[str, Fraction] = {}
@@ -28,9 +28,9 @@ def overlaps(translated: Translation, steps: Sequence[Step]) -> bool:
 
 
 def apart(translated: Translation, steps: Sequence[Step]) -> list[Step] | None:
-    """The steps, some of them later by very little, so that no two write the same fact at one time.
+    """Returns the steps, some of them minimally later, so that no two write the same fact at the same time.
 
-    Returns ``None`` if they cannot be moved so.
+    Returns ``None`` if this is not possible.
     """
     if not translated.is_temporal:
         return list(steps)
@@ -75,7 +75,7 @@ def _shares_time(one: Step, other: Step) -> bool:
 
 
 def _changes(step: Step, delay: Fraction) -> list[Step]:
-    """The step a little later or sooner, or a little longer or shorter."""
+    """Returns the step a little later or earlier, or a little longer or shorter."""
     changes = [step._replace(start=step.start + delay)]
     if step.start >= delay:
         changes.append(step._replace(start=step.start - delay))

@@ -1,6 +1,6 @@
 """Bounds of the numbers of unified-planning's problems, as conditions.
 
-A number may leave its bounds at no time. It is compared with them before each effect that changes it, and in
+A number must never leave its bounds. It is compared with them before each effect that changes it, and at
 the end.
 """
 
@@ -17,7 +17,7 @@ from ._up_expressions import Expressions
 
 
 class Bounds:
-    """The bounds of a problem's fluents that some effect might violate.
+    """Bounds of a problem's fluents that some effect might violate.
 
     Raises:
         UnsupportedError: if such a fluent has no initial value.
@@ -39,11 +39,11 @@ class Bounds:
                 )
 
     def limit(self, fluent: Any) -> tuple[Any, Any] | None:
-        """The least and the greatest value, each perhaps ``None``, of a fluent that might leave them."""
+        """Returns the least and the greatest value (or ``None``) of a fluent that might leave these bounds."""
         return self._limits.get(fluent)
 
     def before(self, effects: Iterable[Any]) -> list[str]:
-        """The conditions of effects that happen at once."""
+        """Returns the conditions of simultaneous effects."""
         found: dict[str, None] = {}
         for effect in effects:
             if self._say.ranges_over_nothing(effect.forall):
@@ -54,7 +54,7 @@ class Bounds:
         return list(found)
 
     def goals(self) -> Iterator[str]:
-        """The conditions of the end."""
+        """Returns the conditions at the end."""
         for fluent in self._limits:
             variables = " ".join(self._say.variable(it) for it in fluent.signature)
             target = f"({self._say.name('fluent', fluent)} {variables})"
@@ -70,7 +70,7 @@ class Bounds:
 
 
 def effects_of(problem: UPProblem) -> Iterator[Any]:
-    """The effects of actions, and those at fixed times."""
+    """Returns the effects of actions, and those at fixed times."""
     for action in problem.actions:
         if isinstance(action, InstantaneousAction):
             yield from action.effects

@@ -50,7 +50,7 @@ CREDITS = Credits(
 
 
 _LONGEST = 1e9
-"""Seconds, longer than any search: larger time limits, infinite ones among them, mean the same."""
+"""Largest time limit in seconds, longer than any search. Larger limits, including infinite ones, are replaced by it."""
 
 
 def _common_kind() -> ProblemKind:
@@ -90,12 +90,12 @@ class ElbowroomPlanner(
 ):
     """Elbowroom's embedded planner.
 
-    Plans of temporal problems come back as time-triggered plans or, with ``params={"plan": "stn"}``, as
-    STN plans. As a replanner it keeps its last plan for as long as that works.
+    Plans of temporal problems are returned as time-triggered plans or, with ``params={"plan": "stn"}``, as
+    STN plans. As a replanner it keeps its last plan as long as the plan is valid.
 
-    Parameters: ``jobs``, how many threads may search (0: one for each processor); ``memory``, about how many
-    bytes the search may use; ``time_limit``, in seconds, also where a call has no ``timeout``; ``seed``, which
-    changes nothing, because the search draws no random numbers; ``plan``, the kind of plan.
+    Parameters: ``jobs``, the number of threads (0: one for each processor); ``memory``, the approximate memory limit in
+    bytes; ``time_limit``, in seconds, which also applies to calls without a ``timeout``; ``seed``, which has no effect,
+    because the search draws no random numbers; ``plan``, the kind of plan.
     """
 
     def __init__(
@@ -163,14 +163,14 @@ class ElbowroomPlanner(
     ) -> PlanGenerationResult:
         if heuristic is not None:
             warnings.warn("elbowroom uses its own heuristic; the given one is ignored", stacklevel=3)
-        # Without a limit the first plan is enough; with one, the search uses all of it.
+        # Without a limit the search stops at the first plan; with one, it uses the whole time.
         timeout = self._limit(timeout)
         return self._result(problem, timeout, first=timeout is None)
 
     def _get_solutions(
         self, problem: Any, timeout: float | None = None, output_stream: IO[str] | None = None
     ) -> Iterator[PlanGenerationResult]:
-        """Each better plan as soon as it is found and, at the end, the best one again, within the time limit."""
+        """Yields each better plan as soon as it is found and, at the end, the best one again, within the time limit."""
         begun = time.monotonic()
         try:
             translated = Translation(problem)
@@ -196,7 +196,7 @@ class ElbowroomPlanner(
             yield self._unsupported(error)
             return
         finally:
-            # Also if the caller stops the iteration.
+            # Runs even if the caller stops the iteration.
             plans.close()
         if last is not None:
             yield last
@@ -204,7 +204,7 @@ class ElbowroomPlanner(
             yield self._without_plan(translated, plans.answer)
 
     def _limit(self, timeout: float | None) -> float | None:
-        """The shorter of the two time limits."""
+        """Returns the shorter of the two time limits."""
         return min((it for it in (timeout, self._time_limit) if it is not None), default=None)
 
     def _result(self, problem: Any, timeout: float | None, first: bool) -> PlanGenerationResult:
@@ -230,7 +230,7 @@ class ElbowroomPlanner(
         )
 
     def _with_plan(self, translated: Translation, found: Plan) -> PlanGenerationResult:
-        """The result where a plan was found, if it keeps unified-planning's rules."""
+        """Returns the result for a plan, if the plan satisfies unified-planning's rules."""
         status = PlanGenerationResultStatus
         steps = apart(translated, [_on_time(translated, step) for step in found.steps])
         if steps is None:
@@ -251,7 +251,7 @@ class ElbowroomPlanner(
         return PlanGenerationResult(status.SOLVED_SATISFICING, plan, self.name, metrics)
 
     def _without_plan(self, translated: Translation, found: NoPlan) -> PlanGenerationResult:
-        """The result where no plan was found: proved only by a certificate that holds by unified-planning's rules."""
+        """Returns the result without a plan. It is proved only by a certificate that holds under unified-planning's rules."""
         status = PlanGenerationResultStatus
         outcome = {"time limit": status.TIMEOUT, "memory limit": status.MEMOUT}.get(
             found.document["stop"], status.UNSOLVABLE_INCOMPLETELY
@@ -268,7 +268,7 @@ class ElbowroomPlanner(
         message = LogMessage(LogLevel.INFO, reason)
         return PlanGenerationResult(outcome, None, self.name, log_messages=[message])
 
-    # The protocol of replanners: the problem is a copy that changes.
+    # Interface of replanners: the problem is a copy that changes.
 
     def _resolve(
         self, timeout: float | None = None, output_stream: IO[str] | None = None
@@ -280,7 +280,7 @@ class ElbowroomPlanner(
         return found
 
     def _still_works(self, plan: Any) -> bool:
-        """Whether the problem, as it has become, is solved by a plan that was made for it earlier."""
+        """Returns ``True`` if an earlier plan solves the changed problem."""
         known = {action.name: action for action in self._problem.actions}
         used = getattr(plan, "timed_actions", None)
         if used is not None:
@@ -334,12 +334,12 @@ class ElbowroomPlanner(
 
 
 class ElbowroomValidator(Engine, PlanValidatorMixin):  # type: ignore[misc, unused-ignore]
-    """Elbowroom's judge, with the rules of unified-planning.
+    """Elbowroom's validator, with the rules of unified-planning.
 
-    Without an ε in the problem, what happens at one time reads the state before, and nothing needs
-    to be apart; with one, interfering happenings keep it. In both cases no two actions write the same fact
-    at one time. Whether an action may overlap with itself (``problem.self_overlapping``) is not judged, as
-    unified-planning's own validator does not. The goal holds after all timed effects.
+    If the problem has no ε, simultaneous happenings read the state before them, and no separation is required. If it has
+    one, interfering happenings are at least ε apart. In both cases no two actions write the same fact at the same time.
+    Like unified-planning's own validator, it does not check whether actions overlap themselves
+    (``problem.self_overlapping``). The goal must hold after all timed effects.
     """
 
     def __init__(self, **unknown: Any) -> None:
@@ -406,7 +406,7 @@ class ElbowroomValidator(Engine, PlanValidatorMixin):  # type: ignore[misc, unus
         )
 
     def _validate_network(self, translated: Translation, plan: STNPlan) -> ValidationResult:
-        """Whether the network has schedules, and each of them is a valid plan, with ε."""
+        """Returns ``True`` if the network has schedules, and each of them is a valid plan, with ε."""
         found = translated.problem.envelope(stn_text(translated, plan), most_checks=1)
         if found:
             return ValidationResult(ValidationResultStatus.VALID, self.name, [])
@@ -415,12 +415,12 @@ class ElbowroomValidator(Engine, PlanValidatorMixin):  # type: ignore[misc, unus
 
 
 def _on_time(translated: Translation, step: Step) -> Step:
-    """A step, at its time if it represents timed effects."""
+    """Returns a step; a step that represents timed effects gets their time."""
     return step._replace(start=translated.timed_actions.get(step.action, step.start))
 
 
 def _left(timeout: float | None, begun: float) -> float | None:
-    """The remaining time limit after the translation, which counts as well."""
+    """Returns the remaining time limit after the translation, whose time is included."""
     return None if timeout is None else min(max(timeout - (time.monotonic() - begun), 0.001), _LONGEST)
 
 
@@ -433,7 +433,7 @@ def _refuse_unknown(unknown: dict[str, Any], engine: str, known: Sequence[str]) 
 
 
 def _whole(name: str, value: Any, allowed: range | None) -> int | None:
-    """A parameter that is a whole number, perhaps as text."""
+    """Reads a parameter that is a whole number, possibly as text."""
     if value is None:
         return None
     number = None
@@ -453,7 +453,7 @@ def _whole(name: str, value: Any, allowed: range | None) -> int | None:
 
 
 def _positive(name: str, value: Any) -> float | None:
-    """A parameter that is a positive number, perhaps as text."""
+    """Reads a parameter that is a positive number, possibly as text."""
     if value is None:
         return None
     try:

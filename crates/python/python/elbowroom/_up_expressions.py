@@ -24,7 +24,7 @@ _INITIAL = {"type": "t", "object": "o", "fluent": "f", "action": "a", "timed": "
 
 
 class Expressions:
-    """The names of a problem's things in PDDL, and its conditions, numbers and effects."""
+    """Converter of a problem's names, conditions, numbers and effects to PDDL."""
 
     def __init__(self, problem: UPProblem, taken: Iterable[str]) -> None:
         self._names: dict[tuple[str, Any], str] = {}
@@ -35,19 +35,19 @@ class Expressions:
         self._simplify = problem.environment.simplifier.simplify
 
     def simplify(self, expression: FNode) -> FNode:
-        """The expression without its static parts."""
-        # The simplifier drops quantified variables that do not occur, as if each type had objects.
+        """Returns the expression without its static parts."""
+        # The simplifier removes quantified variables that do not occur, which is wrong for types without objects.
         return self._simplify(self._without_empty.walk(expression))
 
     def ranges_over_nothing(self, variables: Iterable[Any]) -> bool:
-        """Whether the problem has no object for one of the variables. It need not know the type of that one."""
+        """Returns ``True`` if the problem has no object for one of the variables. It need not declare the type of that one."""
         return any(
             it.type.is_user_type() and next(iter(self._problem.objects(it.type)), None) is None
             for it in variables
         )
 
     def name(self, kind: str, thing: Any) -> str:
-        """The name of something, the same each time."""
+        """Returns the PDDL name of an item, the same in each call."""
         key = (kind, thing.name if hasattr(thing, "name") else str(thing))
         if key not in self._names:
             clean = re.sub(r"[^a-z0-9_-]", "_", key[1].lower())
@@ -62,7 +62,7 @@ class Expressions:
         return self._names[key]
 
     def variable(self, of: Any) -> str:
-        """The name of a parameter or a variable, with its question mark: the same each time, and no two alike."""
+        """Returns the name of a parameter or a variable, with its question mark: unique, and the same in each call."""
         key = (type(of), of.name, of.type)
         if key not in self._variables:
             clean = re.sub(r"[^a-z0-9_-]", "_", of.name.lower())
@@ -76,26 +76,26 @@ class Expressions:
         return "?" + self._variables[key]
 
     def declared(self, variables: Iterable[Any]) -> str:
-        """Parameters or variables with their types, as PDDL declares them."""
+        """Returns the PDDL declaration of parameters or variables with their types."""
         return " ".join(f"{self.variable(it)} - {self.type_name(it.type)}" for it in variables)
 
     def target(self, e: FNode) -> str:
-        """A fluent as the target of an effect."""
+        """Converts a fluent that is the target of an effect."""
         args = [self.walk(arg) for arg in e.args]
         return f"({' '.join([self.name('fluent', e.fluent()), *args])})"
 
     def type_name(self, of: Any) -> str:
-        """The name of a user type."""
+        """Returns the name of a user type."""
         if not of.is_user_type():
             raise UnsupportedError(f"a parameter of type {of}; only user types are supported")
         return self.name("type", of)
 
     def condition(self, expression: FNode) -> str:
-        """A condition, or a number, in PDDL."""
+        """Converts a condition or a number to PDDL."""
         return self.walk(self.simplify(expression))
 
     def walk(self, e: FNode) -> str:
-        """An expression as it stands, in PDDL."""
+        """Converts an expression to PDDL without simplification."""
         args = [self.walk(arg) for arg in e.args]
         if e.is_bool_constant():
             return "(and)" if e.is_true() else "(or)"
@@ -126,7 +126,7 @@ class Expressions:
         return f"({operator} {' '.join(args)})"
 
     def effect(self, effect: Any) -> str:
-        """An effect, with its condition and its forall; empty if there is none."""
+        """Converts an effect, with its condition and its forall. Returns an empty text for an effect without consequences."""
         if self.ranges_over_nothing(effect.forall):
             return ""
         target = self.target(effect.fluent)
@@ -161,7 +161,7 @@ class Expressions:
 
 
     def _assigns_one_number(self, effect: Any) -> bool:
-        """Whether an effect for all objects assigns the same number to the same fluent for each of them."""
+        """Returns ``True`` if an effect for all objects assigns the same number to the same fluent for each object."""
         if not effect.is_assignment() or effect.fluent.type.is_bool_type():
             return False
         free = effect.environment.free_vars_oracle.get_free_variables
@@ -187,7 +187,7 @@ class _WithoutEmptyTypes(IdentityDagWalker):  # type: ignore[misc, unused-ignore
 
 
 def _when(guard: str, change: str) -> str:
-    """A change under one more condition."""
+    """Adds a condition to a change."""
     inner = re.fullmatch(r"\(when (.*)\)", change)
     if inner is None:
         return f"(when {guard} {change})"
@@ -197,7 +197,7 @@ def _when(guard: str, change: str) -> str:
 
 
 def first_of(text: str) -> tuple[str, str]:
-    """The first expression of a text, and the rest."""
+    """Returns the first expression of a text, and the remaining text."""
     depth = 0
     for index, letter in enumerate(text):
         depth += {"(": 1, ")": -1}.get(letter, 0)

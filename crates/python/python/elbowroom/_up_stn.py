@@ -1,4 +1,4 @@
-"""STN plans of unified-planning, from networks and back."""
+"""Conversion between networks and STN plans of unified-planning."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ._up_translate import Translation
 
 
 def stn_plan(translated: Translation, plan: Any) -> STNPlan:
-    """A plan, in any form that a problem of ours reads, as an STN plan of unified-planning's.
+    """Converts a plan, in any form that :class:`~elbowroom.Problem` reads, to an STN plan of unified-planning.
 
     Raises:
         RequestError: if the plan does not work.
@@ -67,10 +67,10 @@ def stn_plan(translated: Translation, plan: Any) -> STNPlan:
 
 
 def stn_text(translated: Translation, plan: STNPlan) -> str:
-    """An STN plan of unified-planning's as an STN plan file.
+    """Converts an STN plan of unified-planning to an STN plan file.
 
     Raises:
-        UnsupportedError: if it says something of the plan's end, which has no counterpart.
+        UnsupportedError: if it constrains the end of the plan, which has no counterpart.
     """
     labels: dict[Any, str] = {}
     lines: list[str] = []
@@ -118,7 +118,7 @@ def _finite(bound: Any) -> Fraction | None:
 
 
 def _instances(text: str) -> dict[str, str]:
-    """The action of each label of an STN plan file."""
+    """Returns the action of each label of an STN plan file."""
     found = {}
     for line in text.splitlines():
         head, _, action = line.partition(":")

@@ -18,7 +18,7 @@ from ._up_expressions import Expressions
 
 
 DEFAULT_EPSILON = Fraction(1, 1000)
-"""The least separation of interfering happenings where the problem has none and its timed effects allow it."""
+"""Default of the least separation of interfering happenings, if the problem has none and its timed effects allow it."""
 
 
 class TimedAction(NamedTuple):
@@ -32,7 +32,7 @@ class TimedEffects:
     """The timed effects of a problem, as timed initials and as actions.
 
     Raises:
-        UnsupportedError: if an effect is at a time that is not counted from the start, or an action is closer
+        UnsupportedError: if the time of an effect is not relative to the start of the plan, or an action is closer
             to other effects than the ε of the problem, which would make it impossible.
     """
 
@@ -50,16 +50,16 @@ class TimedEffects:
                 self.actions.append(TimedAction(time, possible))
         times = {time for time, _ in by_time}
         self.epsilon = Fraction(problem.epsilon or min([DEFAULT_EPSILON, *self._gaps({Fraction(0), *times})]))
-        """The least separation of interfering happenings: that of the problem, if it has one."""
+        """Returns the least separation of interfering happenings: that of the problem, if it has one."""
         if min(self._gaps(times), default=self.epsilon) < self.epsilon:
             raise UnsupportedError(f"timed effects closer than the epsilon {problem.epsilon} are not supported")
 
     def _gaps(self, times: set[Fraction]) -> list[Fraction]:
-        """The distances of the actions to other times."""
+        """Returns the distances of the actions to other times."""
         return [abs(action.time - it) for action in self.actions for it in times if it != action.time]
 
     def _are_assignments(self, effects: list[Any]) -> bool:
-        """Whether they assign constants, and each to another fluent."""
+        """Returns ``True`` if they assign constants, each to a different fluent."""
         targets = {effect.fluent for effect in effects}
         return len(targets) == len(effects) and all(
             effect.is_assignment()
@@ -88,7 +88,7 @@ class TimedEffects:
             yield f"    :effect (and (not {possible}) {self._done(action)} {effects}))"
 
     def initials(self) -> Iterator[str]:
-        """What the initial state and the timed initials consist of."""
+        """Returns the elements of the initial state and the timed initials."""
         yield from self._initials
         for action in self.actions:
             possible = self._possible(action)
@@ -97,31 +97,31 @@ class TimedEffects:
             yield f"(at {action.time + self.epsilon} (not {possible}))"
 
     def goals(self) -> Iterator[str]:
-        """That each action is executed."""
+        """Returns the goal that each action has been executed."""
         for action in self.actions:
             yield self._done(action)
 
     def _possible(self, action: TimedAction) -> str:
-        """The fact that is true only around the action's time."""
+        """Returns the fact that is true only around the action's time."""
         return f"({self._say.name('timed', f'time of effects at {action.time}')})"
 
     def _done(self, action: TimedAction) -> str:
-        """The fact that the action has been executed."""
+        """Returns the fact which states that the action has been executed."""
         return f"({self._say.name('timed', f'done effects at {action.time}')})"
 
     # Plans.
 
     def name_of(self, action: TimedAction) -> str:
-        """Its name in PDDL."""
+        """Returns its name in PDDL."""
         return self._say.name("timed", f"effects at {action.time}")
 
     def times(self) -> dict[str, Fraction]:
-        """The time of each action, by its name in plans."""
+        """Returns the time of each action, by its name in plans."""
         return {f"({self.name_of(action)})": action.time for action in self.actions}
 
 
 def _by_time(problem: UPProblem) -> Iterable[tuple[Fraction, list[Any]]]:
-    """The timed effects by time, those for all objects one by one."""
+    """Returns the timed effects by time; effects for all objects are expanded."""
     found: dict[Fraction, list[Any]] = {}
     for timing, effects in problem.timed_effects.items():
         if not timing.is_from_start():

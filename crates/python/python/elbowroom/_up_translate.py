@@ -1,7 +1,7 @@
-"""From unified-planning's problems to PDDL, exactly, and from plans back.
+"""Exact translation of unified-planning's problems to PDDL, and of plans back.
 
-Numbers are written as fractions; nothing is rounded. Names become valid PDDL names, and no two the
-same. What has no counterpart is refused by name.
+Numbers are written as fractions; nothing is rounded. Names become valid and unique PDDL names.
+Features without a counterpart are rejected by name.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ from ._up_expressions import Expressions, first_of
 from ._up_timed import TimedEffects
 
 COST = "action-costs"
-"""The fluent that is added where actions have costs."""
+"""Name of the additional fluent for the costs of actions."""
 
 
 class Translation:
-    """A problem of unified-planning, and what it is in PDDL.
+    """A problem of unified-planning, and its translation to PDDL.
 
     Raises:
-        UnsupportedError: if the problem has something that has no counterpart; it says what.
+        UnsupportedError: if the problem has a feature without a counterpart; the message names it.
     """
 
     def __init__(self, problem: UPProblem) -> None:
@@ -71,14 +71,14 @@ class Translation:
 
     @property
     def is_temporal(self) -> bool:
-        """Whether plans of the problem have times."""
+        """``True`` if plans of the problem have times."""
         return bool(self.original.kind.has_continuous_time())
 
     def is_refuted_by(self, certificate: dict[str, Any]) -> bool:
-        """Whether a certificate that no plan of the translation exists holds for the problem itself.
+        """``True`` if a certificate that no plan of the translation exists also holds for the problem itself.
 
-        Without an ε, it does if it needs neither a distance between happenings nor that those of one time can
-        be put into an order. So do certificates that list what can become true, without pairs or states.
+        Without an ε, it holds if its proof relies neither on a separation of happenings nor on an order of simultaneous
+        ones. This is so for certificates that only list the facts that can become true, without pairs or states.
         """
         return bool(self.original.epsilon) or not (certificate.get("apart") or certificate.get("closed"))
 
@@ -190,14 +190,14 @@ class Translation:
         return f"(and (>= ?duration {lower}) (<= ?duration {upper}))"
 
     def _strict(self, duration: Any) -> Iterator[str]:
-        """The ends of an open interval as conditions: PDDL has no strict bounds on durations."""
+        """Returns the ends of an open interval as conditions, because PDDL has no strict bounds on durations."""
         if duration.is_left_open():
             yield f"(> ?duration {self._say.condition(duration.lower)})"
         if duration.is_right_open():
             yield f"(< ?duration {self._say.condition(duration.upper)})"
 
     def _costs(self) -> dict[Any, FNode] | None:
-        """What each action costs, if that is the metric."""
+        """Returns the cost of each action, if the metric is the sum of costs."""
         metrics = self.original.quality_metrics
         if len(metrics) != 1:
             return None
@@ -256,19 +256,19 @@ class Translation:
             return f"minimize {self._say.condition(metric.expression)}"
         if metric.is_maximize_expression_on_final_state():
             return f"maximize {self._say.condition(metric.expression)}"
-        # The others rank plans and do not affect their validity.
+        # Other metrics rank plans and do not affect their validity.
         return None
 
     # Plans.
 
     def steps(self, plan: Any) -> list[tuple[Fraction, str, Fraction | None]]:
-        """A plan of unified-planning as (start, action, duration), with the actions for timed effects.
+        """Converts a plan of unified-planning to (start, action, duration), with the actions for timed effects.
 
         Raises:
-            UnsupportedError: if it is no sequential or time-triggered plan.
+            UnsupportedError: if it is neither a sequential nor a time-triggered plan.
         """
         if isinstance(plan, SequentialPlan):
-            # One after the other, at distances greater than any ε.
+            # Actions follow each other at distances greater than any ε.
             gap = max(Fraction(1), 2 * Fraction(self.original.epsilon or 0))
             steps = [(gap * (i + 1), self.name_of(it), None) for i, it in enumerate(plan.actions)]
             return [*steps, *self._timed_steps()]
@@ -289,24 +289,24 @@ class Translation:
         return [(time, name, None) for name, time in self.timed_actions.items()]
 
     def check(self, steps: AnyPlan) -> Verdict:
-        """Judges a plan with exactly these numbers, by the rules of unified-planning."""
+        """Validates a plan with exactly these numbers, by the rules of unified-planning."""
         return self.problem.check(steps, tolerance=0, rules=self.rules)
 
     def name_of(self, instance: ActionInstance) -> str:
-        """An action of the original problem as one of ours."""
+        """Converts an action of the original problem to one of the translation."""
         words = [self._say.name("action", instance.action)]
         words += [self._say.walk(it) for it in instance.actual_parameters]
         return f"({' '.join(words)})"
 
     def instance(self, action: str) -> ActionInstance:
-        """An action of ours as one of the original problem."""
+        """Converts an action of the translation to one of the original problem."""
         name, *arguments = action.strip("()").split()
         manager = self.original.environment.expression_manager
         objects = [manager.ObjectExp(self.objects[it]) for it in arguments]
         return ActionInstance(self.actions[name], tuple(objects))
 
     def plan_back(self, steps: Iterable[Any]) -> Any:
-        """Our plan as a sequential plan, if the problem has no time, or a time-triggered one."""
+        """Converts a plan of the translation to a sequential plan (without time) or a time-triggered one."""
         made = [
             (s.start, self.instance(s.action), s.duration)
             for s in steps
@@ -320,7 +320,7 @@ class Translation:
 
 
 def _split(text: str) -> Iterator[str]:
-    """The expressions of a text, one by one."""
+    """Iterates over the expressions of a text."""
     while text:
         first, text = first_of(text)
         yield first

@@ -1,4 +1,4 @@
-"""Worlds in Python, which start actions and report their outcome."""
+"""Worlds in Python: objects that start actions and report their outcomes."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from ._numbers import Number, exact, text
 
 
 class Action(NamedTuple):
-    """An action that a world has to start."""
+    """A command to a world to start an action."""
 
     ticket: int
     """The number of the start; reports refer to it."""
     name: str
-    """``(drive rover depot shelf)``."""
+    """The ground action: ``(drive rover depot shelf)``."""
     duration: Fraction | None
-    """How long the plan has it take; ``None`` for an instantaneous action."""
+    """The planned duration; ``None`` for an instantaneous action."""
     now: Fraction
-    """When it is to start, by the world's clock."""
+    """The time of the command, on the world's clock."""
 
     @property
     def words(self) -> list[str]:
@@ -28,7 +28,7 @@ class Action(NamedTuple):
 
 
 class Observation(NamedTuple):
-    """What a world reports. Made by :func:`started`, :func:`ended`, :func:`fact`, :func:`value`."""
+    """A report of a world. Created by :func:`started`, :func:`ended`, :func:`fact`, :func:`value`."""
 
     time: Number
     fields: Mapping[str, Any]
@@ -47,7 +47,7 @@ def _measured(amounts: Mapping[str, Number] | None) -> dict[str, Any]:
 def started(
     action: Action | int, time: Number, measured: Mapping[str, Number] | None = None
 ) -> Observation:
-    """An action has started. ``measured`` has the amounts by which its start changed fluents."""
+    """Reports that an action has started. ``measured``: the measured changes of fluents by its start."""
     fields = {"type": "started", "ticket": _ticket(action), **_measured(measured)}
     return Observation(time, fields)
 
@@ -59,33 +59,33 @@ def ended(
     why: str = "",
     measured: Mapping[str, Number] | None = None,
 ) -> Observation:
-    """An action has ended: ``"succeeded"``, ``"failed"`` (say why) or ``"cancelled"``."""
+    """Reports that an action has ended: ``"succeeded"``, ``"failed"`` (with a reason) or ``"cancelled"``."""
     fields = {"type": "ended", "ticket": _ticket(action), "outcome": outcome, "why": why}
     return Observation(time, {**fields, **_measured(measured)})
 
 
 def fact(name: str, becomes: bool, time: Number) -> Observation:
-    """A fact is seen to be true or false: ``fact("(at rover depot)", True, now)``."""
+    """Reports that a fact is observed to be true or false: ``fact("(at rover depot)", True, now)``."""
     return Observation(time, {"type": "fact", "fact": name, "becomes": becomes})
 
 
 def value(fluent: str, amount: Number, time: Number) -> Observation:
-    """A fluent is seen to have a value: ``value("(battery rover)", 80, now)``."""
+    """Reports the observed value of a fluent: ``value("(battery rover)", 80, now)``."""
     return Observation(time, {"type": "value", "fluent": fluent, "value": text(amount)})
 
 
 def wire(observations: Iterable[Observation]) -> list[dict[str, Any]]:
-    """Observations as the native module reads them."""
+    """Converts observations to the form that the native module reads."""
     return [{**fields, "time": text(time)} for time, fields in observations]
 
 
 class World:
-    """A world in which actions are started and things are observed; derive from it.
+    """Base class of worlds that start actions and report observations.
 
-    Each start is answered by :func:`started` and, if the action takes time, later by one
-    :func:`ended`. Each cancel of a running action is answered by an :func:`ended`. Time never goes
-    back. ``docs/formats/world-protocol.md`` has the whole contract; what happens when a world breaks
-    it is defined, and nothing hangs.
+    The world answers each start by :func:`started` and, if the action takes time, later by one
+    :func:`ended`. It answers each cancellation of a running action by an :func:`ended`. Time never
+    decreases. ``docs/formats/world-protocol.md`` has the whole contract, and defines the handling of
+    worlds that violate it; a run never hangs because of such a world.
 
     >>> import elbowroom
     >>> class AsPlanned(elbowroom.World):
@@ -109,18 +109,18 @@ class World:
         raise NotImplementedError("a world needs a method start(action)")
 
     def cancel(self, action: Action) -> None:
-        """Stops an action that is running; its end is to be reported, as cancelled."""
+        """Stops a running action. Its end must be reported as cancelled."""
         raise NotImplementedError("a world needs a method cancel(action)")
 
     def wait(self, until: Fraction) -> tuple[Number, Sequence[Observation]]:
-        """Lets time pass until something is observed, but not beyond ``until``.
+        """Lets time pass until the next observation, at most until ``until``.
 
-        Returns what time it is then, and what has been observed.
+        Returns the time then, and the observations.
         """
         raise NotImplementedError("a world needs a method wait(until)")
 
     def look(self, facts: Sequence[str], fluents: Sequence[str]) -> Sequence[Observation]:
-        """The current values of these facts; empty if the world cannot observe them."""
+        """Returns the current values of these facts; empty if the world cannot observe them."""
         return ()
 
     def resume(
@@ -131,14 +131,14 @@ class World:
         Called once, before anything else, when :meth:`elbowroom.Executive.resume` resumes a run. ``now`` is the time of
         the last record in the journal, ``actions`` are those that had not ended.
 
-        Returns what time it is, and :func:`started` or :func:`ended` for each action whose outcome is known. The others
-        have failed, and are cancelled. ``None``: nothing of the actions runs any more; all of them have failed, and the
-        clock of this world restarts.
+        Returns the present time, and :func:`started` or :func:`ended` for each action whose outcome is known. The others
+        have failed, and are cancelled. ``None`` means that none of the actions is running: all of them have failed, and
+        the clock of this world restarts.
         """
         return None
 
     def stop(self) -> None:
-        """Stops everything. Called once at the end of each run, whatever has ended it."""
+        """Stops all activity. Called once at the end of each run, for any reason of the end."""
 
 
 class AsyncWorld:
@@ -173,7 +173,7 @@ class AsyncWorld:
 def passage(
     answer: tuple[Number, Sequence[Observation]], method: str = "wait"
 ) -> dict[str, Any]:
-    """The answer to a wait, as the native module reads it in JSON."""
+    """Converts the answer to a wait to the JSON that the native module reads."""
     try:
         now, observations = answer
     except (TypeError, ValueError):

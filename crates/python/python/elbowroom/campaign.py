@@ -1,7 +1,7 @@
-"""Experiments: executors compared in many runs, on one machine, with Ray, or with Slurm.
+"""Experiments: comparison of executors in many runs, on one machine, with Ray, or with Slurm.
 
-The results do not depend on where, in how many parts, or by how many workers they were made: the
-trials are numbered, each has its own seed, and what is kept are counts.
+The results do not depend on the machines, the number of parts, or the number of workers: trials
+are numbered, each has its own seed, and the results consist of counts.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Experiment:
 
     @property
     def trials(self) -> int:
-        """How many trials of each problem, case or column it asks for."""
+        """Returns the number of trials of each problem, case or column."""
         return self._native.trials()
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -67,10 +67,10 @@ class Experiment:
         jobs: int = 0,
         progress: ProgressCallback | bool | None = None,
     ) -> str:
-        """Makes one part of the trials: ``results.json``, as the command writes it.
+        """Runs one part of the trials. Returns ``results.json`` as the command writes it.
 
         Raises:
-            KeyboardInterrupt: at Ctrl-C; parts are whole or not there.
+            KeyboardInterrupt: at Ctrl-C. There are no incomplete parts.
         """
         results, is_interrupted = self._make(trials, shard, jobs, progress)
         if is_interrupted:
@@ -88,10 +88,10 @@ class Experiment:
         return self._native.make(count, shard, jobs, listener(progress))
 
     def merge(self, parts: Sequence[str]) -> str:
-        """Puts parts together.
+        """Merges parts.
 
         Raises:
-            RequestError: if one is of another experiment, or comes twice.
+            RequestError: if a part belongs to another experiment, or occurs twice.
         """
         return self._native.merge(list(parts))
 
@@ -104,18 +104,18 @@ def _again(name: str, text: str, files: dict[str, str]) -> Experiment:
 
 
 class Comparison(Table):
-    """Outcome of an experiment."""
+    """Results of an experiment."""
 
     def __init__(self, experiment: Experiment, results: str) -> None:
         self.results: str = results
         """``results.json``, byte for byte as the command writes it."""
         self.document: dict[str, Any] = json.loads(results)
-        """The same, read."""
+        """The parsed ``results.json``."""
         self.csv, self.markdown, self.text = experiment._native.tables(results)
 
     @property
     def is_interrupted(self) -> bool:
-        """Whether it was ended before all trials were made."""
+        """``True`` if it was interrupted before all trials had run."""
         return bool(self.document.get("is_interrupted", False))
 
     def rows(self) -> list[Cell]:
@@ -153,7 +153,7 @@ class Comparison(Table):
         return html_table(heads, rows, str(self.document["title"]))
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """How often each executor reached the goal."""
+        """Draws the success rate of each executor."""
         return _plots.rates(self, ax)
 
     def write(self, folder: str | os.PathLike[str]) -> None:
@@ -188,26 +188,26 @@ def compare(
     wait: bool = True,
     progress: ProgressCallback | bool | None = None,
 ) -> Comparison:
-    """Makes an experiment: executors in many runs, side by side.
+    """Runs an experiment, which compares executors in many runs.
 
     Args:
         experiment: an experiment file (``docs/formats/experiment.md``).
         engine: ``"local"``: threads of this process; ``"ray"``: tasks of a Ray cluster;
             ``"slurm"``: a job array.
-        trials: of each problem and column; the experiment says by default.
-        shards: into how many parts to split; 1 locally, otherwise 8.
-        jobs: how many threads; as many as there are processors by default (with Ray and Slurm, 1).
-        folder: where parts are kept, and the results written. Parts that are there are not made
-            again, unless their bytes are no longer those that were written, which a
-            :class:`DamagedWarning` says. Slurm needs a folder that all nodes share.
-        address: of the Ray cluster; by default one that is running, or one on this machine.
-        retries: how often a part is made again when its worker dies.
+        trials: the number of trials of each problem and column; by default that of the experiment.
+        shards: the number of parts; by default 1 locally, otherwise 8.
+        jobs: the number of threads; by default one for each processor (1 with Ray and Slurm).
+        folder: the folder for parts and results. Existing parts are not computed again, unless
+            their bytes have changed since they were written; a :class:`DamagedWarning` reports
+            that. Slurm needs a folder that all nodes share.
+        address: the address of the Ray cluster; by default a running one, or one on this machine.
+        retries: the number of times that a part is computed again if its worker dies.
         sbatch: further options of ``sbatch``, such as ``["--partition=short"]``.
-        wait: with Slurm, whether to wait for the jobs. Otherwise call again to collect the parts.
-        progress: is told of trials, or of parts; ``True`` shows a bar.
+        wait: with Slurm, ``True`` to wait for the jobs. Otherwise call again to collect the parts.
+        progress: receives the number of finished trials or parts; ``True`` shows a bar.
 
     Returns:
-        The results: the same bytes, however they were made.
+        The results. Their bytes do not depend on the engine and the number of parts.
 
     Raises:
         ReadError: if the experiment cannot be read.
@@ -250,7 +250,7 @@ class _Parts:
         return self.folder / f"part-{shard}-of-{self.shards}.json"
 
     def collect(self) -> None:
-        """Takes the parts that are there; those that are damaged are named, and are to be made again."""
+        """Reads the existing parts. Damaged parts are reported, and have to be computed again."""
         for shard in range(self.shards):
             path = self.path(shard)
             if shard in self.made or not path.exists():
@@ -280,7 +280,7 @@ class _Parts:
             path = self.path(shard)
             _keep(path, results)
             # In the format of `sha256sum`. The sum is written last: a part with an older sum is
-            # made again.
+            # computed again.
             _keep(_sum_of(path), f"{hashlib.sha256(results.encode()).hexdigest()}  {path.name}\n")
 
     def missing(self) -> list[int]:
@@ -324,7 +324,7 @@ def _damage(path: Path) -> str | None:
 
 
 def _keep(path: Path, text: str) -> None:
-    """Writes a file whole or not at all."""
+    """Writes a file atomically."""
     unfinished = path.with_name(f"{path.name}.{os.getpid()}.unfinished")
     unfinished.write_text(text, encoding="utf-8", newline="\n")
     unfinished.replace(path)
@@ -446,7 +446,7 @@ def _slurm(
 
 
 def make_part(arguments: Sequence[str]) -> None:
-    """Makes one part, in a job of Slurm (``python -m elbowroom._job``)."""
+    """Computes one part, in a job of Slurm (``python -m elbowroom._job``)."""
     folder, (shard, shards, jobs, trials) = Path(arguments[0]), map(int, arguments[1:5])
     inputs = json.loads((folder / "experiment.json").read_text(encoding="utf-8"))
     experiment = _again(inputs["name"], inputs["text"], inputs["files"])

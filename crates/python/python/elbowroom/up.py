@@ -6,9 +6,9 @@
     with OneshotPlanner(name="elbowroom") as planner: ...
     with PlanValidator(name="elbowroom-val") as validator: ...
 
-``elbowroom`` plans once, anytime, and again and again as the problem changes (``Replanner``);
-``elbowroom-val`` judges sequential, time-triggered and STN plans exactly. What unified-planning has
-no mode for are functions here: :func:`envelope`, :func:`to_stn`, :func:`execute`.
+``elbowroom`` is a one-shot planner, an anytime planner, and a planner for changing problems (``Replanner``).
+``elbowroom-val`` validates sequential, time-triggered and STN plans exactly. Questions for which
+unified-planning has no operation mode are functions here: :func:`envelope`, :func:`to_stn`, :func:`execute`.
 """
 
 from __future__ import annotations
@@ -26,26 +26,26 @@ from ._up_translate import Translation
 
 
 def envelope(problem: UPProblem, plan: Any, **options: Any) -> Envelope:
-    """How far each quantity of a plan may deviate while the plan still works.
+    """Computes how far each quantity of a plan may deviate while the plan still works.
 
     Options are those of :meth:`elbowroom.Problem.envelope`; actions in them have their names in PDDL,
     which are those of the problem in lower case.
 
     Raises:
-        UnsupportedError: if the problem or the plan has what has no counterpart; it says what.
+        UnsupportedError: if the problem or the plan has a feature without a counterpart in PDDL; the message names it.
     """
     translated = Translation(problem)
     return translated.problem.envelope(_given(translated, plan), **options)
 
 
 def to_stn(problem: UPProblem, plan: Any) -> STNPlan:
-    """A plan with only the orders and bounds that it needs; durations have the domain's intervals.
+    """Relaxes a plan to the necessary orders and bounds; durations have the domain's intervals.
 
     Unlike a conversion inside unified-planning, it does not freeze durations. An STN plan has no
-    absolute times: what is fixed by timed effects counts from the plan's start.
+    absolute times: times that timed effects fix are relative to the plan's start.
 
     Raises:
-        UnsupportedError: if the problem or the plan has what has no counterpart; it says what.
+        UnsupportedError: if the problem or the plan has a feature without a counterpart in PDDL; the message names it.
         RequestError: if the plan does not work.
     """
     translated = Translation(problem)
@@ -53,7 +53,7 @@ def to_stn(problem: UPProblem, plan: Any) -> STNPlan:
 
 
 def _given(translated: Translation, plan: Any) -> Any:
-    """A plan of unified-planning's in a form that a problem of ours reads."""
+    """Converts a plan of unified-planning to a form that :class:`~elbowroom.Problem` reads."""
     return stn_text(translated, plan) if isinstance(plan, STNPlan) else translated.steps(plan)
 
 
@@ -61,7 +61,7 @@ def execute(problem: UPProblem, plan: Any, **options: Any) -> Run:
     """Executes a plan; options are those of :meth:`elbowroom.Problem.run`.
 
     Raises:
-        UnsupportedError: if the problem or the plan has what has no counterpart; it says what.
+        UnsupportedError: if the problem or the plan has a feature without a counterpart in PDDL; the message names it.
     """
     translated = Translation(problem)
     return translated.problem.run(translated.steps(plan), **options)

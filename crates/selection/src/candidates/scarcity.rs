@@ -14,7 +14,8 @@ use crate::rewrite::add_function_of;
 /// Scarcity of amounts in a variant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Scarcity {
-    /// The quantile, in percent: amounts are at most this scarce in this share of cases.
+    /// The quantile, in percent: in this share of cases, the amounts are no scarcer than in the
+    /// variant.
     pub(super) quantile: u64,
     /// The position of the rule in the world; `None` for all rules.
     pub(super) of: Option<usize>,

@@ -152,7 +152,7 @@ impl Variant {
 }
 
 /// Changes the durations of actions. No duration becomes shorter than planned, because a plan with
-/// shorter durations is no plan of the task.
+/// shorter durations is not a plan of the task.
 fn slow_down(task: &Task, problem: &mut Problem, slow: &dyn Fn(&str, &Rational) -> Rational) {
     for schema in (0..problem.schemas.len()).map(SchemaId::from) {
         set_durations(task, schema, problem, &|name, planned| {

@@ -1,4 +1,4 @@
-//! Samples of one scene: [`Stage`].
+//! Samples of one scene: [`SampleSet`].
 
 use std::collections::BTreeMap;
 

@@ -209,7 +209,7 @@ impl Reader<'_> {
         })
     }
 
-    /// Returns the limit inside the braces or the one beside them. It is an error if there are
+    /// Returns the limit inside the braces or the one next to them. It is an error if there are
     /// both.
     fn merge_limits(&self, inside: Limit, beside: &Limit) -> Read<Limit> {
         match (inside, beside) {

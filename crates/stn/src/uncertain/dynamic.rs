@@ -103,7 +103,7 @@ pub(super) struct Search<'a, W> {
     links: &'a UncertainNetwork<W>,
     graph: &'a mut Graph<W>,
     pub(super) stage: Vec<Stage>,
-    /// For each processed node, the nodes through which negative ways lead to it. The edges found
+    /// For each processed node, the nodes through which negative paths lead to it. The edges found
     /// for the node depend only on them, and on the edges that end at them.
     pub(super) regions: Vec<Vec<NodeId>>,
     /// Stack of negative nodes being processed; each one is needed by the previous one.
@@ -112,7 +112,7 @@ pub(super) struct Search<'a, W> {
     keeps_edges: bool,
 }
 
-/// Callback for cycles: receives the place where a cycle closes and its ways in order, and returns
+/// Callback for cycles: receives the place where a cycle closes and its paths in order, and returns
 /// whether the search continues.
 type OnCycle<'a, W> = dyn FnMut(&Graph<W>, ClosedCycle, &[PathId]) -> ControlFlow<()> + 'a;
 
@@ -136,7 +136,7 @@ struct Frame<W> {
 }
 
 impl<W: Weight> Frame<W> {
-    /// Returns the way from a node that has been reached.
+    /// Returns the path from a node that has been reached.
     fn at(&self, node: NodeId) -> &Reached<W> {
         self.reached.get(node).expect("it has been reached")
     }
@@ -146,12 +146,12 @@ impl<W: Weight> Frame<W> {
     }
 }
 
-/// Place where the ways of the current frames close a cycle.
+/// Place where the paths of the current frames close a cycle.
 #[derive(Clone, Copy)]
 pub(super) enum ClosedCycle {
-    /// At a node that is being processed, by the shortest way to it.
+    /// At a node that is being processed, by the shortest path to it.
     At(NodeId),
-    /// At the node of the last frame, by a longer way that begins with this edge.
+    /// At the node of the last frame, by a longer path that begins with this edge.
     By(EdgeId),
 }
 
@@ -160,7 +160,7 @@ struct Reached<W> {
     distance: Extended<W>,
     /// Its first edge.
     edge: EdgeId,
-    /// The way, once it is known to be the shortest.
+    /// The path, once it is known to be the shortest.
     path: Option<PathId>,
 }
 
@@ -192,8 +192,8 @@ impl<'a, W: Weight> Search<'a, W> {
     }
 
     /// Processes a node, and the nodes that have to be processed before it, and continues after
-    /// conflicts. `on_cycle` receives each conflict as ways, each beginning where the previous one
-    /// ends, and returns whether the search continues. A way that has led to a conflict is not
+    /// conflicts. `on_cycle` receives each conflict as paths, each beginning where the previous one
+    /// ends, and returns whether the search continues. A path that has led to a conflict is not
     /// followed any further.
     pub(super) fn settle_all(
         &mut self,
@@ -303,7 +303,7 @@ impl<'a, W: Weight> Search<'a, W> {
         true
     }
 
-    /// Records a way that begins with that edge.
+    /// Records a path that begins with that edge.
     fn reach(&mut self, edge: EdgeId, distance: Extended<W>) {
         let from = self.graph.edges[edge].from;
         let Some(frame) = self.frames.last_mut() else {
@@ -331,8 +331,8 @@ impl<'a, W: Weight> Search<'a, W> {
         frame.reached.insert(from, reached);
     }
 
-    /// Records the shortest way from a node to the last frame's node as an edge. Returns `false` if
-    /// the way need not be extended in its current form: a wait that is redundant, or that has
+    /// Records the shortest path from a node to the last frame's node as an edge. Returns `false`
+    /// if the path need not be extended in its current form: a wait that is redundant, or that has
     /// become a plain edge.
     fn record_edge(&mut self, node: NodeId) -> bool {
         let way = self.shortest_path(node);
@@ -395,7 +395,7 @@ impl<'a, W: Weight> Search<'a, W> {
         }
     }
 
-    /// Returns the shortest way from a node to the last frame's node, and fixes it.
+    /// Returns the shortest path from a node to the last frame's node, and fixes it.
     fn shortest_path(&mut self, node: NodeId) -> PathId {
         let way = self.path_to(self.frames.len() - 1, node);
         let frame = self.frames.last_mut();
@@ -405,13 +405,13 @@ impl<'a, W: Weight> Search<'a, W> {
         way
     }
 
-    /// Returns the shortest known way from a node to that frame's node.
+    /// Returns the shortest known path from a node to that frame's node.
     fn path_to(&mut self, frame: usize, node: NodeId) -> PathId {
         let edge = self.frames[frame].at(node).edge;
         self.path_by_edge(frame, edge)
     }
 
-    /// Returns the shortest known way to that frame's node that begins with this edge.
+    /// Returns the shortest known path to that frame's node that begins with this edge.
     fn path_by_edge(&mut self, frame: usize, edge: EdgeId) -> PathId {
         let frame = &self.frames[frame];
         let next = self.graph.edges[edge].to;
@@ -441,7 +441,7 @@ impl<'a, W: Weight> Search<'a, W> {
         }
     }
 
-    /// Returns the cycle that closes there: the ways from that place to the last frame's node, and
+    /// Returns the cycle that closes there: the paths from that place to the last frame's node, and
     /// from each frame's node to the previous one, back to that place.
     fn cycle(&mut self, closed: ClosedCycle) -> Vec<PathId> {
         let node = match closed {

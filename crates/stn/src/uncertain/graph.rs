@@ -37,7 +37,7 @@ pub(super) enum Kind {
 pub(super) enum Origin {
     Requirement(ConstraintId),
     Link(LinkId),
-    /// Derived from a way.
+    /// Derived from a path.
     Path(PathId),
 }
 
@@ -46,20 +46,20 @@ pub(super) enum Origin {
 const REDUNDANCY_FACTOR: usize = 2;
 const SMALL_GRAPH: usize = 100;
 
-/// Identifier of a way: its position in [`Graph::ways`].
+/// Identifier of a path: its position in [`Graph::ways`].
 pub(super) type PathId = usize;
 
-/// An edge, and the way that follows it.
+/// An edge, and the path that follows it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Path {
     edge: u32,
-    /// One more than the identifier of the way.
+    /// One more than the identifier of the path.
     rest: Option<NonZero<u32>>,
 }
 
 impl Path {
-    /// Creates a way from an edge and the way that follows it. Numbers are stored in 32 bits,
-    /// because a network may have millions of ways.
+    /// Creates a path from an edge and the path that follows it. Numbers are stored in 32 bits,
+    /// because a network may have millions of paths.
     pub(super) fn new(edge: EdgeId, rest: Option<PathId>) -> Self {
         let short = |number: usize| u32::try_from(number).expect("fewer than 2^32 ways");
         Self {

@@ -85,8 +85,8 @@ impl UncertainNetwork<Rational> {
         let bounds = bounds.chain(self.links.iter().map(|link| &link.lower));
         let bounds = bounds.chain(self.links.iter().filter_map(|link| link.upper.as_ref()));
         let denominator = CommonDenominator::of(bounds.chain(times))?;
-        // A way in the search is no longer than one bound, or with infinite bounds, one for each
-        // node. A conflict has at most one such way for each node.
+        // A path in the search is no longer than one bound, or with infinite bounds, one for each
+        // node. A conflict has at most one such path for each node.
         let nodes = i64::try_from(self.requirements.node_count()).ok()? + 2;
         let ways = if self.links.iter().any(|link| link.upper.is_none()) {
             nodes.checked_mul(nodes)?

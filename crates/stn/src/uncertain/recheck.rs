@@ -11,18 +11,18 @@ const MAX_LEFTOVERS: usize = 4;
 
 /// Dynamically controllable network that supports changes of link bounds, one link at a time.
 ///
-/// The edges found for a negative node depend on the nodes through which negative ways lead to it,
+/// The edges found for a negative node depend on the nodes through which negative paths lead to it,
 /// and on the edges that end at these. Only nodes that depend on the link, directly or indirectly,
 /// are searched again. In the networks of plans these are few.
 #[derive(Clone, Debug)]
 pub struct Recheck<W> {
     network: UncertainNetwork<W>,
     graph: Graph<W>,
-    /// For each node, the nodes through which negative ways lead to it.
+    /// For each node, the nodes through which negative paths lead to it.
     regions: Vec<Vec<NodeId>>,
     /// For each node, the number of the network's own edges that end there and are not negative.
     given: Vec<usize>,
-    /// Number of edges and ways that the last search of the whole network found.
+    /// Number of edges and paths that the last search of the whole network found.
     fresh: usize,
 }
 
@@ -143,7 +143,7 @@ impl<W: Weight> Recheck<W> {
         before.collect()
     }
 
-    /// Returns the nodes to which negative ways lead through `node`.
+    /// Returns the nodes to which negative paths lead through `node`.
     fn nodes_through(&self, node: NodeId) -> impl Iterator<Item = NodeId> + '_ {
         let nodes = self.network.requirements.nodes();
         nodes.filter(move |other| self.regions[other.index()].contains(&node))

@@ -15,21 +15,21 @@ const MAX_PARTS: usize = 10_000;
 /// The limit on the parts of all refutations of a network, for each of its nodes.
 const MAX_PARTS_PER_NODE: usize = 8;
 
-/// Limit on the nesting of ways. Derivations along a long plan can be nested as deeply as the plan
+/// Limit on the nesting of paths. Derivations along a long plan can be nested as deeply as the plan
 /// is long.
 const MAX_DEPTH: usize = 200;
 
-/// One part of a way through the graph of a network, from its beginning to its end.
+/// One part of a path through the graph of a network, from its beginning to its end.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Part {
     /// A requirement.
     Requirement(ConstraintId),
     /// Lower-case edge of a link, from activation to end, as long as its lower bound. It may be
-    /// used because the parts after it on its way sum up to a negative length.
+    /// used because the parts after it on its path sum up to a negative length.
     Early(LinkId),
     /// The upper-case edge of a link, from end to activation: minus its upper bound.
     Late(LinkId),
-    /// A way that counts as one edge.
+    /// A path that counts as one edge.
     Path(RefutationPath),
 }
 
@@ -38,7 +38,7 @@ pub enum Part {
 pub struct RefutationPath {
     /// The parts; each begins where the previous one ends.
     pub parts: Vec<Part>,
-    /// If present, the way is a wait for the end of that link, used as an edge that always holds,
+    /// If present, the path is a wait for the end of that link, used as an edge that always holds,
     /// because it is no longer than the link's minimum duration. For all bounds, an edge of minus
     /// the link's lower bound holds instead. So the edge's length is the greater of the two.
     pub unlabelled: Option<LinkId>,
@@ -46,15 +46,15 @@ pub struct RefutationPath {
 
 /// Proof that a network is not dynamically controllable, rule by rule.
 ///
-/// The cycle of ways is semi-reducible if, in each way, the parts after a [`Part::Early`] add up to
-/// less than 0. If the cycle also adds up to less than 0, no strategy exists. That is true of every
-/// network with these requirements and links, whatever their bounds (Morris 2006, Morris &
+/// The cycle of paths is semi-reducible if, in each path, the parts after a [`Part::Early`] add up
+/// to less than 0. If the cycle also adds up to less than 0, no strategy exists. That is true of
+/// every network with these requirements and links, whatever their bounds (Morris 2006, Morris &
 /// Muscettola 2005).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Refutation {
-    /// The cycle; each way begins where the previous one ends.
+    /// The cycle; each path begins where the previous one ends.
     pub cycle: Vec<RefutationPath>,
-    /// `true` if the ways are nested so deeply that only their steps are given, as one way. With
+    /// `true` if the paths are nested so deeply that only their steps are given, as one path. With
     /// other bounds such a refutation proves something only if it contains no link both as
     /// [`Part::Early`] and as [`Part::Late`]. The steps are then a cycle of bounds, and if they add
     /// up to less than 0, there is no schedule for these durations.
@@ -144,7 +144,7 @@ struct UsedEdges {
 }
 
 impl UsedEdges {
-    /// Returns `true` if all edges of a way, requirements excepted, have been used before.
+    /// Returns `true` if all edges of a path, requirements excepted, have been used before.
     fn has<W: Weight>(&self, graph: &Graph<W>, way: PathId) -> bool {
         let mut edges = path_suffixes(graph, way).map(|way| graph.paths[way].edge());
         edges.all(|id| {
@@ -152,7 +152,7 @@ impl UsedEdges {
         })
     }
 
-    /// Returns the parts of a way.
+    /// Returns the parts of a path.
     fn expand<W: Weight>(
         &mut self,
         graph: &Graph<W>,
@@ -163,7 +163,7 @@ impl UsedEdges {
         if depth > MAX_DEPTH {
             return Err(RefutationLimit::Deep);
         }
-        // Exact capacity, because there are many ways, most of them short.
+        // Exact capacity, because there are many paths, most of them short.
         let mut parts = Vec::with_capacity(path_suffixes(graph, way).count());
         for way in path_suffixes(graph, way) {
             parts.push(self.part(graph, graph.paths[way].edge(), count, depth)?);
@@ -208,7 +208,7 @@ impl UsedEdges {
         })
     }
 
-    /// Returns the steps of a cycle as one way; `None` if there are too many.
+    /// Returns the steps of a cycle as one path; `None` if there are too many.
     fn flat_path<W: Weight>(
         &mut self,
         graph: &Graph<W>,
@@ -242,12 +242,12 @@ enum RefutationLimit {
     Deep,
 }
 
-/// Returns a way, its remainder after the first edge, and so on.
+/// Returns a path, its remainder after the first edge, and so on.
 fn path_suffixes<W>(graph: &Graph<W>, way: PathId) -> impl Iterator<Item = PathId> + '_ {
     std::iter::successors(Some(way), |&way| graph.paths[way].rest())
 }
 
-/// Returns the link whose end a way waits for.
+/// Returns the link whose end a path waits for.
 fn label<W: Weight>(graph: &Graph<W>, way: PathId) -> Option<LinkId> {
     let last = path_suffixes(graph, way).last()?;
     match graph.edges[graph.paths[last].edge()].kind {

@@ -12,7 +12,7 @@ use elbowroom_stn::uncertain::{
 };
 use elbowroom_stn::{Constraint, Network, NodeId};
 
-/// Returns the length of a way with a network's bounds, and `true` if the way is valid with them:
+/// Returns the length of a path with a network's bounds, and `true` if the path is valid with them:
 /// the part after a lower-case edge is negative.
 fn length(way: &RefutationPath, network: &UncertainNetwork<i64>) -> (i64, bool) {
     let mut length = 0;

@@ -1,4 +1,5 @@
-//! Changes of facts and fluents along a plan: [`Histories`]. [`Reading`] evaluates them at one moment.
+//! Changes of facts and fluents along a plan: [`Histories`].
+//! [`PointState`](super::point_state::PointState) evaluates them at one moment.
 //!
 //! Happenings that interfere keep the order of the plan in all schedules (`valid`). Others commute. So each
 //! happening reads the same facts in all schedules, and numbers that are the same expressions in times and

@@ -1,4 +1,4 @@
-//! Times as functions of few times and parameters: [`Places`].
+//! Times as functions of few times and parameters: [`OffsetComponents`].
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -18,8 +18,8 @@ pub(super) struct OffsetComponents {
 }
 
 impl OffsetComponents {
-    /// Collects the connections of a network. The moment inside an action, which has the position after the last
-    /// point, has a component of its own.
+    /// Collects the connections of a network. The moment inside an action, which has the position
+    /// after the last point, has a separate component.
     pub(super) fn new(certificate: &Certificate) -> Self {
         let count = certificate.points.len() + 1;
         let mut edges: Vec<Vec<(usize, Linear)>> = vec![Vec::new(); count];

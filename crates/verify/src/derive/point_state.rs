@@ -1,4 +1,4 @@
-//! Facts and numbers at one moment of a plan: [`Reading`].
+//! Facts and numbers at one moment of a plan: [`PointState`].
 
 use std::cell::OnceCell;
 use std::collections::BTreeMap;
@@ -260,7 +260,7 @@ pub(super) fn combined(
     }
 }
 
-/// Returns the quotient, or `None` if the divisor is no number other than zero.
+/// Returns the quotient, or `None` if the divisor is not a nonzero number.
 pub(super) fn quotient(left: &Linear, right: &Linear) -> Option<Linear> {
     let inverse = Rational::ONE.checked_div(right.as_number()?)?;
     Some(left.scaled(&inverse))

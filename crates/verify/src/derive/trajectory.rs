@@ -1,4 +1,5 @@
-//! Constraints on the course of the plan, as orders and bounds on differences of times: [`bounds`].
+//! Constraints on the course of the plan, as orders and bounds on differences of times:
+//! [`TrajectoryDerivation`].
 //!
 //! The facts that a constraint reads change at some points. These *turns* keep their order in all schedules, and
 //! those at one time stay together. So the constraint's conditions are true and false in the same phases in each

@@ -50,7 +50,7 @@ impl StaticFacts {
         }
     }
 
-    /// Adds the valueless fluents that a condition mentions anywhere, also by way of rules.
+    /// Adds the valueless fluents that a condition mentions anywhere, including through rules.
     pub(super) fn mentioned_by_condition(
         &self,
         task: &Task,

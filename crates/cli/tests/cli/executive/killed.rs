@@ -334,7 +334,7 @@ fn journal_killed_during_rotation_is_resumed() {
     fs::remove_dir_all(&place).expect("the folder is there");
 }
 
-/// Returns the records of a journal that hold a time of the world.
+/// Returns the records of a journal that contain a time of the world.
 fn passed(journal: &str) -> Vec<Value> {
     let text = fs::read_to_string(journal).expect("a journal");
     let lines = text.lines().filter_map(|line| line.split_once(' '));

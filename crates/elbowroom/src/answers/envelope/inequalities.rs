@@ -52,7 +52,7 @@ pub struct NetworkRow {
 pub struct RequirementRow {
     /// The requirement in words.
     pub words: String,
-    /// `true` if it is the order of two happenings. A violation of it is no proof that the plan
+    /// `true` if it is the order of two happenings. A violation of it does not prove that the plan
     /// fails: the plan may also work in another order.
     pub is_order: bool,
     /// The cases of a violation: it is violated if all inequalities of one of them hold.

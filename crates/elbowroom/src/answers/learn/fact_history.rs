@@ -1,4 +1,4 @@
-//! Changes of facts in a run, by actions and by themselves: [`Course`].
+//! Changes of facts in a run, by actions and spontaneously: [`FactHistory`].
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;

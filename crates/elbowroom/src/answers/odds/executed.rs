@@ -23,7 +23,8 @@ const CACHE_SIZE: usize = 2000;
 pub struct ExecutedAnswer {
     /// The executor.
     pub executor: String,
-    /// `true` if new plans were made, by the embedded planner and in no simulated time.
+    /// `true` if new plans were allowed. The embedded planner makes them, and planning takes no
+    /// simulated time.
     pub replans: bool,
     /// Number of samples.
     pub samples: u64,
@@ -83,7 +84,7 @@ fn execute_with(
         if watcher.flow().is_break() {
             break;
         }
-        // A task of its own makes each sample independent of the earlier ones.
+        // A separate task makes each sample independent of the earlier ones.
         let task = Arc::new(request.task.with_own_table());
         let seed = request.settings.seed.wrapping_add(sample);
         let report = Execution::of(&task)

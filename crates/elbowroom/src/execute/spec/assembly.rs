@@ -224,8 +224,9 @@ impl RunSpec {
         }))
     }
 
-    /// Returns the knowledge for the choice of the first plan. `None` if the planner's own plan is
-    /// used: if it was requested, there is no knowledge, or goals are given later.
+    /// Returns the model of the world for the choice of the first plan. `None` if the planner's own
+    /// plan is used: because it was requested, because there is no model, or because goals are
+    /// given later.
     fn first_plan_knowledge(
         &self,
         task: &Task,

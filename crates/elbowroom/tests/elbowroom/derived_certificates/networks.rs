@@ -1,4 +1,4 @@
-//! Certificates checked against plan files with constraints of their own.
+//! Certificates checked against plan files with additional constraints.
 
 use std::path::Path;
 use std::sync::Arc;

@@ -55,13 +55,13 @@ fn amount_with_duration_uses_observed_duration() {
         panic!("{:?}", report.reasons);
     };
     assert_eq!(behind.to_string(), "(survey rover crater) succeeded at 20");
-    // A larger amount due to a longer duration is no deviation.
+    // A larger amount due to a longer duration is not a deviation.
     let model = scene.world("[[duration]]\naction = \"recharge\"\nconstant = 10.5\n");
     let report = scene.run("fixed:10", &model, 0);
     assert_eq!(report.replans, 0, "{:?}", report.reasons);
 }
 
-/// The amounts are no parameters, and are still measured: 60 for each instead of 30.
+/// The amounts are not parameters, and are still measured: 60 for each instead of 30.
 #[test]
 fn live_checks_fixed_amounts_against_remaining_plan() {
     for (plan, known) in [

@@ -5,7 +5,7 @@ use elbowroom::num::Rational;
 
 use crate::execution::scene::{EXECUTORS, Scene};
 
-/// Actions that end during planning are no steps of the abandoned plan. The new plan, which
+/// Actions that end during planning are not steps of the abandoned plan. The new plan, which
 /// continues with the running actions, must not wait for them.
 #[test]
 fn action_that_ends_during_planning_is_over_in_new_plan() {

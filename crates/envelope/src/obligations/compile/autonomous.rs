@@ -219,7 +219,7 @@ impl Compiler<'_> {
         }
     }
 
-    /// Returns the refusal of conditional effects with open outcomes, which are not supported
+    /// Returns the error for conditional effects with open outcomes, which are not supported
     /// together with nature.
     pub(super) fn guard_depends(&self, node: NodeId) -> Refusal {
         Refusal::Nature {

@@ -1,4 +1,4 @@
-//! Uncertain initial facts, until they are observed: [`Initial`].
+//! Uncertain initial facts, until they are observed: [`InitialBelief`].
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! Order searches of plans, for executors that adopt the same plan repeatedly: [`Orders`].
+//! Order searches of plans, for executors that adopt the same plan repeatedly: [`OrderCache`].
 
 use std::sync::{Arc, Mutex, PoisonError};
 

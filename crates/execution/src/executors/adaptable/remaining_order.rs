@@ -1,4 +1,4 @@
-//! Execution of a plan by its orders, or of a policy table: [`Rest`].
+//! Execution of a plan by its orders, or by a policy table: [`RemainingOrder`].
 
 mod numeric_conditions;
 

@@ -7,8 +7,9 @@ use super::{ExecutedPlan, guarantee_status};
 use crate::executor::PreparedPlan;
 
 impl ExecutedPlan {
-    /// Returns `true` if a better plan is to be searched for: the guarantee has become weaker than
-    /// at the last search, and little slack is left for the actions that have not begun.
+    /// Returns `true` if the executor should search for a better plan: the guarantee has become
+    /// weaker than at the last search, and little slack is left for the actions that have not
+    /// begun.
     pub(super) fn seeks_better_plan(&mut self, now: &Rational) -> bool {
         if self.guarantee <= self.guarantee_at_last_search || !self.has_actions_to_begin() {
             return false;
@@ -17,7 +18,7 @@ impl ExecutedPlan {
         self.slack(now) < Rational::new(1, 4)
     }
 
-    /// Returns `true` if another plan is better than the rest of this one: its guarantee is no
+    /// Returns `true` if another plan is better than the remaining present one: its guarantee is no
     /// weaker, and it has at least twice the slack.
     pub(super) fn is_worse_than(&self, mission: &PreparedPlan, now: &Rational) -> bool {
         let has_guarantee =

@@ -185,7 +185,7 @@ impl ExecutedPlan {
     /// Returns `true` if the remaining plan works without a query of the region, as long as running
     /// actions end within the box. This holds if all observations lie within the box and a schedule
     /// for the remaining plan exists. The dispatched network guarantees a schedule for all
-    /// durations it was prepared for, except with [`Promise::Luck`].
+    /// durations it was prepared for, except with [`GuaranteeLevel::Luck`].
     pub(super) fn is_covered(&self, now: &Rational, region: &dyn RegionOracle) -> bool {
         let local = self.dispatch.to_plan_time(now);
         let mut due = self.box_membership.due_by(&local);

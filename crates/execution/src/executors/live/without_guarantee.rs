@@ -36,9 +36,10 @@ impl ReductionClass {
 /// A plan that is executed without a guarantee.
 pub(super) struct UnguaranteedPlan {
     executor: Box<dyn Executor>,
-    /// The plan is abandoned if the hope falls below this.
+    /// The plan is abandoned if a larger reduction of the planned durations becomes necessary.
     reduction: ReductionClass,
-    /// Time until which that hope holds if no action ends before, on the world's clock.
+    /// Time until which that reduction is sufficient if no action ends before, on the world's
+    /// clock.
     until: Option<Rational>,
     /// Start of the continuation. No other plan was found then.
     since: Rational,
@@ -92,8 +93,9 @@ impl UnguaranteedPlan {
 }
 
 impl ExecutedPlan {
-    /// Returns the hope for the remaining plan after this reason to abandon it. Insufficient
-    /// numbers may still suffice if durations deviate favourably.
+    /// Returns the reduction of planned durations that the remaining plan needs to succeed, after
+    /// this reason to abandon it. Insufficient numbers may still suffice if durations deviate
+    /// favourably.
     pub(super) fn reduction_class(&self, reason: &Reason, now: &Rational) -> ReductionClass {
         let lacks_numbers = matches!(
             (reason.cause, &reason.about),
@@ -123,8 +125,8 @@ impl ExecutedPlan {
         )
     }
 
-    /// Returns the time until which there is this much hope if no action ends before; `Err` if
-    /// there is less.
+    /// Returns the time until which this reduction is sufficient if no action ends before; `Err` if
+    /// it is not sufficient now.
     fn reduction_valid_until(
         &self,
         hope: ReductionClass,
@@ -167,7 +169,8 @@ impl ExecutedPlan {
         })
     }
 
-    /// Returns the decision of the executor without a guarantee, as long as there is hope.
+    /// Returns the decision of the executor without a guarantee, as long as the allowed reduction
+    /// is sufficient.
     pub(super) fn decide_without_guarantee(
         &mut self,
         moment: &DecisionContext<'_>,

@@ -169,7 +169,7 @@ impl Run<'_> {
         })
     }
 
-    /// Continues a preparation. Returns `true` if the executor is not to be asked.
+    /// Continues a preparation. Returns `true` if the executor makes no decision now.
     pub(super) fn poll_preparation(&mut self) -> Result<bool, Stop> {
         let Some(search) = &self.search else {
             return Ok(false);

@@ -46,7 +46,7 @@ impl Run<'_> {
         self.switch_unfitted(search, plan)
     }
 
-    /// Switches to the plan as it was made.
+    /// Switches to the unchanged plan.
     pub(in crate::run) fn switch_unfitted(
         &mut self,
         search: BackgroundSearch,
@@ -87,7 +87,7 @@ impl Run<'_> {
     }
 
     /// Switches to a finished plan when it is due, or prepares it. Returns `true` if the executor
-    /// is not to be asked.
+    /// makes no decision now.
     pub(super) fn switch_if_due(&mut self) -> Result<bool, Stop> {
         let Some(search) = &self.search else {
             return Ok(false);

@@ -116,7 +116,7 @@ impl File {
     }
 
     /// Returns the rule that chooses first plans, by default their probability. If the experiment
-    /// names a plan, or another planner with a plan of its own, there is no choice.
+    /// names a plan, or another planner with its own plan, there is no choice.
     pub(super) fn first_plan(&self) -> Result<FirstPlan, (Span, String)> {
         let is_embedded = self
             .planner

@@ -19,7 +19,8 @@ const MOST_CUTS: usize = 64;
 const MOST_SUMMED: usize = 8;
 
 impl Amount {
-    /// Returns the largest value of the amount that changes the number by at most `way`.
+    /// Returns the cut of the amount that separates changes (or assigned values) of at most `way`
+    /// from larger ones, in millionths.
     fn cut(&self, way: i64) -> i64 {
         match self.change {
             ChangeOperator::Set | ChangeOperator::Add => way,
@@ -194,8 +195,8 @@ impl TimedWorld {
         number.known = known.into_iter().collect();
     }
 
-    /// Returns the pairs of a known value and a step such that two equal random amounts of this
-    /// step lead from the value to a threshold.
+    /// Returns pairs of a known value and an amount: two random amounts of this size lead from the
+    /// value to a threshold.
     fn halves(&self, amount: &Amount) -> Vec<(i64, i64)> {
         if amount.change == ChangeOperator::Set {
             return Vec::new();

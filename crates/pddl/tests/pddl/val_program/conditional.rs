@@ -1,6 +1,7 @@
 //! Conditional effects of durative actions whose condition is about the start or all of the action.
 //!
-//! VAL turns each of them into an action of its own, a *conditional effect monitor* that happens at the end.
+//! VAL turns each of them into a separate action, a *conditional effect monitor* that happens at
+//! the end.
 
 use std::fmt::Write as _;
 

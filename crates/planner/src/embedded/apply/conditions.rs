@@ -151,8 +151,9 @@ impl Stepper<'_> {
             .then_some(())
     }
 
-    /// As [`preserves_conditions`](Self::keeps_conditions), where numbers depend on times and are
-    /// watched as they change.
+    /// Does the same as [`preserves_conditions`](Self::preserves_conditions) if numbers depend on
+    /// times. Comparisons that read such numbers or durations count as true here, because they are
+    /// checked when they change.
     fn preserves_facts(&self, state: &State) -> Option<()> {
         let symbolic = state.symbolic.as_ref()?;
         let may_pass = |test: u32, open: &OpenAction| {

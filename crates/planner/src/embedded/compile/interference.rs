@@ -280,7 +280,8 @@ impl Annotations {
         (number != NONE).then_some(number)
     }
 
-    /// Returns the annotations to keep a distance from, each once with its largest distance.
+    /// Returns the annotations that a happening must be separated from, each with the largest
+    /// required distance.
     pub(super) fn after(&self, separations: &Separations) -> Vec<(u32, Ticks)> {
         let mut list: Vec<(u32, Ticks)> = separations
             .after
@@ -292,7 +293,7 @@ impl Annotations {
         list
     }
 
-    /// Returns the annotations to set.
+    /// Returns the annotations that a happening sets.
     pub(super) fn marks(&self, separations: &Separations) -> Vec<u32> {
         let mut list: Vec<u32> = separations
             .makes

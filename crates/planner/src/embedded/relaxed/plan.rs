@@ -1,4 +1,4 @@
-//! The relaxed plan, made of the cheapest achievers.
+//! Extraction of the relaxed plan from the cheapest achievers.
 
 use elbowroom_num::Rational;
 

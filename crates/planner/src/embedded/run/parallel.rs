@@ -90,7 +90,7 @@ mod threaded {
         }
     }
 
-    /// Ends all strands when dropped, also in a panic, so that no thread waits for ever.
+    /// Ends all strands when dropped, even in a panic, so that no thread waits for ever.
     struct StopOnDrop<'t>(&'t Turn);
 
     impl Drop for StopOnDrop<'_> {
@@ -99,8 +99,8 @@ mod threaded {
         }
     }
 
-    /// As [`run_parallel`](super::side_by_side), with several threads. The calling thread only
-    /// receives, since `hear` may be bound to it.
+    /// Does the same as [`run_parallel`](super::run_parallel) with several threads. The calling
+    /// thread only receives reports, because `hear` may be bound to it.
     pub(super) fn run_threads<R: Send>(
         jobs: Vec<Job<'_, R>>,
         (threads, ahead): (usize, usize),

@@ -1,11 +1,11 @@
-//! Time windows of the rests (suffixes) of an order: [`Rests`].
+//! Time windows of the suffixes of an order: [`Suffixes`].
 //!
-//! The same as [`TimeSlacks`](super::Rooms), computed backwards from the end. When a rest begins, only
-//! few of its time points are constrained by the past: zero, its first happening, the ends of
+//! The same as [`TimeSlacks`](super::TimeSlacks), computed backwards from the end. When a suffix
+//! begins, the past constrains only few of its time points: zero, its first happening, the ends of
 //! running actions, and happenings that may come less than ε after the first one. The network of
-//! each rest, projected on these, is computed once, each from the next one. Combined with the
-//! observed times, it gives the window of the first happening, in time proportional to the number
-//! of running actions and not to the length of the rest.
+//! each suffix, projected on these points, is computed once from that of the next shorter suffix.
+//! Combined with the observed times, it gives the window of the first happening, in time
+//! proportional to the number of running actions, whatever the length of the suffix.
 
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node, NodeId};
@@ -16,11 +16,11 @@ use crate::model::Model;
 use crate::search_state::SearchState;
 use crate::total_order::Slot;
 
-/// With more points than this, a rest and those before it are not projected: a matrix for each
-/// position in an order would cost more than it saves.
+/// If a suffix has more points than this, it and all longer ones are not projected: a matrix for
+/// each position in an order would cost more than it saves.
 const MOST_POINTS: usize = 40;
 
-/// The rests of a sequence, by their first position.
+/// The suffixes of a sequence, by their first position.
 #[derive(Clone, Debug)]
 pub(crate) struct Suffixes {
     /// First position.
@@ -31,7 +31,7 @@ pub(crate) struct Suffixes {
     timed_before: Vec<usize>,
 }
 
-/// Network of a rest.
+/// Network of a suffix.
 #[derive(Clone, Debug)]
 enum SuffixNetwork {
     /// It has no schedule at any time.
@@ -48,13 +48,13 @@ pub(crate) enum FirstWindow {
     In(Slot),
     /// There is no schedule.
     Never,
-    /// The rests are for another number of passed timed initials, or are not projected.
+    /// The suffixes are for another number of passed timed initials, or are not projected.
     Unknown,
 }
 
 impl Suffixes {
-    /// Computes the rests of `sequence` from position `from` on. `passed` is the number of relevant
-    /// timed initials before it; `running` are the running actions after the sequence.
+    /// Computes the suffixes of `sequence` from position `from` on. `passed` is the number of
+    /// relevant timed initials before it; `running` are the running actions after the sequence.
     pub(crate) fn of(
         model: &Model,
         separations: &Separations,
@@ -105,18 +105,18 @@ impl Suffixes {
         }
     }
 
-    /// Returns `true` if the rests are for `passed` timed initials before this position.
+    /// Returns `true` if the suffixes are for `passed` timed initials before this position.
     pub(crate) fn matches(&self, position: usize, passed: usize) -> bool {
         position >= self.from && self.timed_before[position - self.from] == passed
     }
 
-    /// Returns `true` if timed initials are part of the rest.
+    /// Returns `true` if timed initials are part of the suffix.
     pub(crate) fn has_timed(&self, position: usize) -> bool {
         let before = position.checked_sub(self.from);
         before.is_none_or(|before| Some(&self.timed_before[before]) != self.timed_before.last())
     }
 
-    /// Returns the window of the happening at this position, if the rest begins now. The running
+    /// Returns the window of the happening at this position, if the suffix begins now. The running
     /// actions must be those of the order there.
     pub(crate) fn first(
         &self,
@@ -141,8 +141,8 @@ impl Suffixes {
 }
 
 impl TimeSlack {
-    /// Returns the room of a rest with one more happening in front; `behind` is the previous first
-    /// one. Returns `None` if it has no schedule.
+    /// Returns the network of a suffix with one more happening in front; `behind` is the previous
+    /// first one. Returns `None` if it has no schedule.
     fn before(
         &self,
         model: &Model,
@@ -211,7 +211,7 @@ impl TimeSlack {
         self.retain(|place| is_near[place]);
     }
 
-    /// Returns the window of the first happening of a rest that begins in these circumstances.
+    /// Returns the window of the first happening of a suffix that begins in these circumstances.
     fn first_window_at(
         mut self,
         separations: &Separations,

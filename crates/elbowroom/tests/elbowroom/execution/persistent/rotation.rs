@@ -264,7 +264,7 @@ fn cases() -> impl Iterator<Item = Case> {
     })
 }
 
-/// Rotations do not change any decision. Each segment alone, also if truncated anywhere, replays
+/// Rotations do not change any decision. Each segment alone, even if truncated anywhere, replays
 /// with the same decisions and the same texts.
 #[test]
 fn record_rotated_during_run_replays_to_same_decisions() {

@@ -1,10 +1,10 @@
 //! Conditions on numbers that the happenings of a plan change by constants: cumulative resources,
 //! reservoirs, counters.
 //!
-//! Conflicts of two instances become clauses at once. The others are learnt from schedules in which
-//! a condition fails: some happening that consumes must come later, or be over, or some happening
-//! that produces must come earlier (precedence constraint posting; Cesta, Oddi & Smith, Journal of
-//! Heuristics 8, 2002; Laborie, AIJ 143, 2003).
+//! Conflicts of two instances become clauses at once. Other clauses are learnt from schedules in
+//! which a condition fails. Such a clause states that a consuming happening comes later, or its
+//! action has already ended, or a producing happening comes earlier (precedence constraint posting;
+//! Cesta, Oddi & Smith, Journal of Heuristics 8, 2002; Laborie, AIJ 143, 2003).
 
 use std::cmp::Reverse;
 
@@ -17,7 +17,8 @@ use super::super::WorkMeter;
 use super::clauses::negated;
 use super::model::{Model, Need, snap_of};
 
-/// For each block that changes a sum, its happenings that do, in order, with the amounts.
+/// For each block that changes a sum: the happenings of the block that change it, in order, with
+/// the amounts.
 pub(super) type Sum = Vec<(u32, Vec<(u32, i64)>)>;
 
 /// A sum that must not be negative (nor zero, if the test is strict) while it is needed.
