@@ -6,9 +6,7 @@
 //!
 //! | request or observation | result |
 //! | --- | --- |
-//! | a goal | the goal is now the conjunction of all open goals, except those that are [set
-//! aside](super::goal_selection). If the remaining plan, started now, reaches it, the plan is kept;
-//! otherwise a new plan is made |
+//! | a goal | the goal is now the conjunction of all open goals, except those that are [set aside](super::goal_selection). If the remaining plan, started now, reaches it, the plan is kept; otherwise a new plan is made |
 //! | a goal with the name of an open one | it replaces the earlier goal; a new plan is made |
 //! | a goal with a release time in the future | it is [queued](super::queued_goals) until then, and then handled like a new goal |
 //! | a goal to keep | it is pursued whenever it does [not hold](super::kept_goals) and no other goal is |

@@ -96,7 +96,7 @@ impl fmt::Display for ViolationKind {
                 now,
             } => write!(
                 f,
-                "has the duration {}, but is still running at time {}; possible durations: {possible}",
+                "has the duration {}, but is running at time {} and can only have a duration in {possible}",
                 decimal(duration),
                 decimal(now)
             ),

@@ -314,13 +314,13 @@ fn plan_in_mid_execution_continues_running_actions() {
     let mut over = rest.clone();
     over.steps[0].duration = Some(Rational::new(1, 2));
     assert!(
-        said(&situation, &over).contains("still running at time 1"),
+        said(&situation, &over).contains("is running at time 1"),
         "{}",
         said(&situation, &over)
     );
     situation.running[0].duration = Interval::closed(Rational::ONE, Rational::from(2));
     assert!(
-        said(&situation, &rest).contains("[1, 2] was possible"),
+        said(&situation, &rest).contains("can only have a duration in [1, 2]"),
         "{}",
         said(&situation, &rest)
     );
