@@ -216,7 +216,8 @@ impl<'a> Explainer<'a> {
     }
 
     /// Returns the validator's objection to the plan at these values with the earliest times.
-    /// `None` as in [`verdict`](Self::verdict), and if there is no schedule.
+    /// `None` if the validator has none, if it cannot check the plan because a number outside the plan is open,
+    /// or if there is no schedule.
     pub fn verdict_at(&self, valuation: Valuation) -> Option<String> {
         let network = self.plan.plan.network(&valuation);
         let network = ConsistentNetwork::try_from(network).ok()?;

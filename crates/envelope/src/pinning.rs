@@ -22,7 +22,7 @@ use crate::linear::Factor;
 use crate::obligations::Requirement;
 use crate::soundness::{Broken, SoundBox, broken_in};
 
-/// Does the same as [`sound`] for a deordered plan, which often needs no further bounds.
+/// Does the same as [`pin`] for a deordered plan, which often needs no further bounds.
 pub fn pin_deordered(task: &Task, plan: ParametrizedPlan, nominal: &Schedule) -> ParametrizedPlan {
     if keeps_all_that_is_read(task, &plan, nominal) {
         return plan;

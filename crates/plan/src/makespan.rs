@@ -29,7 +29,7 @@ pub fn last_end(plan: &TimeTriggeredPlan) -> Rational {
 }
 
 /// Returns the network of the schedules where the durations that the executor chooses are as
-/// planned ([`ParametrizedPlan::with_planned_durations`]). If there is no such schedule, it is the
+/// planned. If there is no such schedule, it is the
 /// network of all schedules; `None` if there are none at all.
 ///
 /// A plan that works only for other durations has at most the weak guarantee.

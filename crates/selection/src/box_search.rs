@@ -30,7 +30,7 @@ pub struct EnvelopeSettings {
     /// Settings of the search for the box.
     pub search: Search,
     /// World whose distributions of durations
-    /// [`Objective::Probability`](Objective::Probability) uses.
+    /// [`Objective::Probability`] uses.
     pub world: Option<Arc<WorldModel>>,
 }
 
