@@ -276,10 +276,10 @@ def test_second_run_of_a_world_is_refused() -> None:
     world = Depot()
     with Executive(*CASE, world=world) as first:
         assert first.wait("problem", HANG)
-        with pytest.raises(elbowroom.WorldError, match="another run uses this world"):
+        with pytest.raises(elbowroom.RequestError, match="another run uses this world"):
             elbowroom.read(*CASE).run(world=world)
-        with pytest.raises(elbowroom.WorldError, match="another run uses this world"):
-            Executive(*CASE, world=world).stop()
+        with pytest.raises(elbowroom.RequestError, match="another run uses this world"):
+            Executive(*CASE, world=world)
         assert world.stops == 0, "the world is left to the first one"
         assert first.wait(first.submit(HOME), HANG)
     assert world.stops == 1

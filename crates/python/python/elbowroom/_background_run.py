@@ -57,6 +57,8 @@ class BackgroundRun:
         except BaseException as error:
             self._failure = error
         finally:
+            if self._lifecycle is not None:
+                self._lifecycle.release()
             self._over.set()
 
     def _execute(self) -> None:

@@ -21,7 +21,7 @@ from typing import Any
 
 from ._calls import WorldLoop, WorldThread
 from ._clock import ClockCheck, Overdue
-from ._errors import ClockWarning, RequestError
+from ._errors import ClockWarning
 from ._world import Action, Observation, ended, passage, wire
 
 GRACE = 5.0
@@ -41,12 +41,6 @@ POLL_INTERVAL = 0.1
 """Longest time until a signal is noticed, in seconds."""
 
 
-_worlds_in_use: list[object] = []
-"""The worlds of current runs."""
-
-_worlds_lock = threading.Lock()
-
-
 class Blocked(Exception):
     """The world has not answered within the grace period."""
 
@@ -64,11 +58,8 @@ class Lifecycle:
         submit: WorldThread | WorldLoop,
         request_stop: Callable[[], None],
         time_limit: float | None = None,
-        owner: object = None,
     ) -> None:
-        """``owner`` is the user's world, if ``world`` adapts it."""
         self._world = world
-        self._owner = world if owner is None else owner
         self._submit = submit
         self._request_stop = request_stop
         self._time_limit = None if time_limit is None else time.monotonic() + time_limit
@@ -93,8 +84,7 @@ class Lifecycle:
         self._callables = 0
         self.clock = ClockCheck()
         self.is_begun = False
-        # Another run uses the world.
-        self._is_refused = False
+        self._is_released = False
         self.is_ended_early = False
 
     # Requests from outside.
@@ -210,9 +200,9 @@ class Lifecycle:
     def cancel(self, now: str, ticket: int) -> None:
         self._now = now
         action = self._actions.get(ticket)
-        if action is None or self._is_refused:
+        if action is None:
             # The world did not receive this start.
-            why = "another run uses this world" if self._is_refused else "the world failed before it was started"
+            why = "the world failed before it was started"
             self._unstarted.append(ended(ticket, Fraction(now), "cancelled", why))
         elif ticket not in self._cancelled:
             self._cancelled.add(ticket)
@@ -275,15 +265,20 @@ class Lifecycle:
         begun = time.monotonic()
         self._is_closing = True
         self._ends_since = begun if since is None else since
-        if self._is_refused or not self._has_claimed():
-            self._submit.close()
-            return None
         try:
             return self._stop_world(since, begun)
         finally:
             self._submit.close()
-            with _worlds_lock:
-                _worlds_in_use[:] = [it for it in _worlds_in_use if it is not self._owner]
+            self.release()
+
+    def release(self) -> None:
+        """Lets another run use the world."""
+        self._is_released = True
+
+    @property
+    def is_released(self) -> bool:
+        """``True`` after :meth:`finish` or :meth:`release`."""
+        return self._is_released
 
     def _stop_world(self, since: float | None, begun: float) -> Exception | None:
         for ticket in [*self._open]:
@@ -308,27 +303,12 @@ class Lifecycle:
     # Helpers.
 
     def _begin(self, method: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        if not self._has_claimed():
-            self.begin_end()
-            raise RequestError(
-                "another run uses this world: the two would take each other's observations; "
-                "give each run a world of its own, or wait for the end of the other run"
-            )
+        self.is_begun = True
         future = self._submit(method, *arguments)
         future.add_done_callback(lambda _: self._inbox.put(None))
         self._unfinished = [it for it in self._unfinished if not it.done()]
         self._unfinished.append(future)
         return future
-
-    def _has_claimed(self) -> bool:
-        """Claims the world at the first call. Returns ``False`` if another run uses it."""
-        if not self.is_begun and not self._is_refused:
-            with _worlds_lock:
-                self._is_refused = any(it is self._owner for it in _worlds_in_use)
-                if not self._is_refused:
-                    _worlds_in_use.append(self._owner)
-                    self.is_begun = True
-        return self.is_begun
 
     def _call(self, method: Callable[..., Any], *arguments: Any) -> Any:
         """Returns the answer of a method, or ``None`` if the run is to end and the method still runs."""

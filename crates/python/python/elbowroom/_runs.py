@@ -59,20 +59,38 @@ def run_options(
     return chosen
 
 
+_worlds_in_use: list[tuple[object, Lifecycle]] = []
+"""The worlds of runs that have not ended."""
+
+_worlds_lock = threading.Lock()
+
+
 def world_lifecycle(
     world: Any,
     request_stop: Callable[[], None],
     limit: float | None = None,
     loop: asyncio.AbstractEventLoop | None = None,
 ) -> Lifecycle:
-    """The lifecycle of a world in Python. With ``loop``, its methods may be coroutines of that event loop."""
+    """The lifecycle of a world in Python. With ``loop``, its methods may be coroutines of that event loop.
+
+    Raises:
+        RequestError: if another run uses the world.
+    """
     is_in_loop = isinstance(world, AsyncWorld) or has_coroutines(world)
     submit = WorldLoop(loop) if loop is not None and is_in_loop else WorldThread()
     lifecycle: Lifecycle | None = None
     owner = world
-    if isinstance(world, SteppedWorld):
-        world = SteppedAdapter(world, lambda: lifecycle is not None and lifecycle.is_ending)
-    lifecycle = Lifecycle(world, submit, request_stop, limit, owner)
+    with _worlds_lock:
+        _worlds_in_use[:] = [it for it in _worlds_in_use if not it[1].is_released]
+        if any(it is owner for it, _ in _worlds_in_use):
+            raise RequestError(
+                "another run uses this world: the two would take each other's observations; "
+                "give each run a separate world, or wait for the end of the other run"
+            )
+        if isinstance(world, SteppedWorld):
+            world = SteppedAdapter(world, lambda: lifecycle is not None and lifecycle.is_ending)
+        lifecycle = Lifecycle(world, submit, request_stop, limit)
+        _worlds_in_use.append((owner, lifecycle))
     return lifecycle
 
 
@@ -161,6 +179,8 @@ class RunRequest:
                 failure = lifecycle.finish()
             return self._result(answer, failure)
         finally:
+            if lifecycle is not None:
+                lifecycle.release()
             if handle is not None:
                 handle._disconnect(end)
 
