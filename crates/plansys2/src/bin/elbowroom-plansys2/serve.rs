@@ -33,6 +33,8 @@ use order::Order;
 
 /// Interval at which the hub checks for lost performers.
 const TICK: Duration = Duration::from_millis(200);
+/// Time within which another executor is discovered.
+const DISCOVERY_TIME: Duration = Duration::from_secs(2);
 /// Maximum interval between two reports of the progress of a plan.
 const REPORT_INTERVAL: Duration = Duration::from_secs(1);
 /// Time limit of a run for its shutdown.
@@ -128,10 +130,13 @@ impl Server {
     /// Another executor uses the performers.
     pub(super) fn run(mut self, received: &Receiver<Input>) -> Result<(), String> {
         warn("serves planner/get_plan and execute_plan");
-        self.topics.hold_claim(self.now());
         let mut leaves: Option<Duration> = None;
         let mut refusal = Ok(());
         loop {
+            // Until then, it gives way to an executor that it discovers.
+            if self.now() >= DISCOVERY_TIME {
+                self.topics.hold_claim(self.now());
+            }
             self.topics.publish_claim(self.now());
             let due = self
                 .execution
