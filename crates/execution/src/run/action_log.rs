@@ -12,7 +12,7 @@ use elbowroom_num::Rational;
 use super::start_dependencies::{StartDependency, StepEvent, start_dependencies};
 use crate::belief_state::BeliefState;
 use crate::event::{ActionHandle, Ending, Measured};
-use crate::executor::{Order, PreparedPlan, StepId};
+use crate::executor::{Order, PlanEvent, PreparedPlan, StepId};
 
 /// Number of steps in the report of an executive that were executed before it was last idle.
 const MAX_REPORTED_STEPS: usize = 2000;
@@ -483,6 +483,67 @@ impl ActionLog {
         if let Some(entry) = self.entries.get_mut(&ticket) {
             entry.cancelled = Some(time.clone());
         }
+    }
+
+    /// Returns the steps of a plan to which these starts belong: of each action, the first ones
+    /// that are not running when the plan begins. `None` if a start belongs to no step.
+    pub(super) fn match_steps(
+        &self,
+        mission: &PreparedPlan,
+        begun: &[ActionHandle],
+    ) -> Option<BTreeMap<StepId, ActionHandle>> {
+        if begun.is_empty() {
+            return Some(BTreeMap::new());
+        }
+        let steps = mission.instances.iter().zip(&mission.time_triggered.steps);
+        let steps = steps.map(|(instance, step)| (StepId::from(*instance), step));
+        let mut left: Vec<_> = steps
+            .filter(|(id, _)| !mission.running.contains_key(id))
+            .collect();
+        left.sort_by(|(_, one), (_, other)| one.start.cmp(&other.start));
+        let step_of = |ticket: &ActionHandle| {
+            let name = &self.get(*ticket)?.action.name;
+            let index = left.iter().position(|(_, it)| it.action.name == *name)?;
+            Some((left.remove(index).0, *ticket))
+        };
+        begun.iter().map(step_of).collect()
+    }
+
+    /// Returns the start of a step as news.
+    pub(super) fn start_event(
+        &self,
+        step: StepId,
+        ticket: ActionHandle,
+    ) -> Option<(Rational, PlanEvent)> {
+        let time = self.get(ticket)?.started.clone()?;
+        let measured = Vec::new();
+        let news = PlanEvent::Started {
+            step,
+            time: time.clone(),
+            measured,
+        };
+        Some((time, news))
+    }
+
+    /// Returns the end of a step as news. An instantaneous action ends when it starts.
+    pub(super) fn end_event(
+        &self,
+        step: StepId,
+        ticket: ActionHandle,
+    ) -> Option<(Rational, PlanEvent)> {
+        let entry = self.get(ticket)?;
+        let (time, ending) = entry.ended.clone()?;
+        if entry.planned.is_none() && entry.started.is_some() {
+            return None;
+        }
+        let measured = Vec::new();
+        let news = PlanEvent::Ended {
+            step,
+            time: time.clone(),
+            ending,
+            measured,
+        };
+        Some((time, news))
     }
 
     /// Returns all actions that have started and are not forgotten, as steps for the validator.
