@@ -166,8 +166,7 @@ fn write(
         write("trials.csv", &records.table().csv())?;
     }
     for (name, plot) in answer.plots() {
-        let svg = plot.svg().map_err(|error| Failure::new(error, ""))?;
-        write(&format!("{name}.svg"), &svg)?;
+        write(&format!("{name}.svg"), &plot.svg())?;
     }
     Ok(())
 }

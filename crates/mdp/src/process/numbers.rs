@@ -1,16 +1,16 @@
-//! Division of the values of numbers and of random amounts into intervals. The cuts are where a
-//! value decides a condition: at once, after constant amounts, or after a second draw. So the
+//! Numbers of a world: their comparisons and changes, and the division of their values and of random
+//! amounts into intervals. The cuts are where a value decides a condition: at once, after constant amounts, or after a second draw. So the
 //! division is exact for a number that has changed only by constant amounts.
 
 use std::collections::BTreeSet;
 
+use elbowroom_num::Rational;
 use elbowroom_sim::Side as Part;
 
-use super::{Amount, ChangeOperator, ChangeValue, INFINITE, Span, UNIT};
-use crate::NotTabulated;
-use crate::process::action_model::{ActionModel, Snap};
-use crate::process::world::TimedWorld;
-use crate::process::world::{Facts, unknown_shape};
+use super::action_model::{ActionModel, Facts, Snap};
+use super::value_intervals::{Amount, ChangeOperator, ChangeValue, INFINITE, Number, Span, UNIT};
+use super::world::{TimedWorld, unknown_shape};
+use crate::settings::{NotTabulated, Side};
 
 /// Maximum number of cuts of a number, or of a random amount.
 const MOST_CUTS: usize = 64;
@@ -30,6 +30,50 @@ impl Amount {
 }
 
 impl TimedWorld {
+    /// Returns the facts together with the comparisons that hold for the numbers, for this side.
+    pub(crate) fn with_tests(&self, facts: Facts, numbers: &[Span], side: Side) -> Facts {
+        let tests = self.tests.iter().enumerate();
+        let holding = tests.filter(|(_, test)| test.holds(numbers[test.number], side));
+        let first = self.facts.len();
+        holding.fold(facts & !self.tested, |all, (place, _)| {
+            all | 1 << (first + place)
+        })
+    }
+
+    /// Applies the changes of a happening to numbers, with the given draw.
+    pub(crate) fn apply_changes(&self, numbers: &mut [Span], snap: &Snap, draw: usize) {
+        for (amount, by) in snap.amounts.iter().zip(&snap.draws[draw].1) {
+            let number = amount.number;
+            numbers[number] = amount.apply_to(&self.numbers[number], numbers[number], *by);
+        }
+    }
+
+    /// Returns the possible intervals of numbers with these values in a state, the most exact
+    /// first.
+    pub(crate) fn spans_of(&self, values: &[Rational]) -> Option<Vec<Vec<Span>>> {
+        let mut all = vec![Vec::new()];
+        for (number, value) in self.numbers.iter().zip(values) {
+            let span = Span::around(value)?;
+            let mut ways = vec![number.widened(span)];
+            if ways[0].low == ways[0].high {
+                let wider = Number {
+                    known: Vec::new(),
+                    ..number.clone()
+                };
+                ways.push(wider.widened(span));
+            }
+            let longer = all.iter().flat_map(|before: &Vec<Span>| {
+                ways.iter().map(move |way| {
+                    let mut longer = before.clone();
+                    longer.push(*way);
+                    longer
+                })
+            });
+            all = longer.collect();
+        }
+        Some(all)
+    }
+
     /// Computes the cuts of numbers, and the possible draws of random amounts.
     pub(crate) fn cut(&mut self) -> Result<(), NotTabulated> {
         for place in 0..self.numbers.len() {

@@ -1,4 +1,4 @@
-//! Time-outs of actions: the rule, the warning before a time-out, and the cancellation at it.
+//! The rule that sets the time-outs of actions.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -6,16 +6,7 @@ use std::str::FromStr;
 
 use elbowroom_num::Rational;
 
-use super::work_queue::PendingStep;
-use super::{Run, UnknownSetting};
-use crate::event::ActionHandle;
-use crate::record::{Entry, WarningCause};
-
-/// Longest wait for the end of a cancelled action, in seconds of the world's clock.
-const CANCEL_TIMEOUT: i64 = 600;
-
-/// The same for an action that was cancelled because it had reached its time-out.
-const CANCEL_TIMEOUT_AFTER_TIMEOUT: i64 = 10;
+use super::UnknownSetting;
 
 /// The rule that sets the time-out of each action: the longest time from its start, or from its
 /// last progress, to its end. An action that reaches its time-out is cancelled and counts as
@@ -216,93 +207,5 @@ impl FromStr for TimeoutRule {
                        the planned duration, but at least 600 seconds; time-outs of single actions \
                        follow: `10x,600; drive=40; (pick a)=3x,5`",
         })
-    }
-}
-
-/// An action that can time out.
-struct ActionTimeout {
-    ticket: ActionHandle,
-    /// The time of the warning; `None` if it was given, or if the action has been cancelled.
-    warn: Option<Rational>,
-    /// The time-out.
-    until: Rational,
-}
-
-impl Run<'_> {
-    /// Returns the time-outs of the actions that have not ended, on the world's clock.
-    fn action_timeouts(&self) -> impl Iterator<Item = ActionTimeout> + '_ {
-        let open = self.action_log.open_tickets();
-        open.filter_map(|ticket| {
-            let entry = self.action_log.get(ticket)?;
-            if let Some(cancelled) = &entry.cancelled {
-                let stopping = match entry.timed_out {
-                    Some(_) => CANCEL_TIMEOUT_AFTER_TIMEOUT,
-                    None => CANCEL_TIMEOUT,
-                };
-                return Some(ActionTimeout {
-                    ticket,
-                    warn: None,
-                    until: cancelled + Rational::from(stopping),
-                });
-            }
-            let planned = entry.planned.clone().unwrap_or_default();
-            let timeout = self.settings.timeout.of(&entry.action.name, &planned)?;
-            let began = entry.started.as_ref().unwrap_or(&entry.commanded);
-            let progress = entry.progress.as_ref().map_or(began, |(time, _)| time);
-            let until = began.max(progress) + &timeout;
-            // The warning comes when a quarter of the time between the planned end and the time-out
-            // is left.
-            let since = if planned < timeout {
-                planned
-            } else {
-                Rational::ZERO
-            };
-            let ahead = (timeout - since) * Rational::new(1, 4);
-            let is_new = entry.warned_timeout.as_ref() != Some(&until);
-            Some(ActionTimeout {
-                ticket,
-                warn: is_new.then(|| &until - ahead),
-                until,
-            })
-        })
-    }
-
-    /// Returns the time of the next warning or time-out. An action may end exactly at its time-out,
-    /// and several reports on one moment may arrive one after the other, so it is cancelled ε
-    /// later. While an action is running that never times out, the time limit of the run is
-    /// returned at the latest.
-    pub(super) fn next_timeout(&self) -> Option<Rational> {
-        let epsilon = self.task.epsilon();
-        let due = self.action_timeouts();
-        let due = due.map(|limit| limit.warn.unwrap_or_else(|| limit.until + epsilon));
-        let mut open = self.action_log.open_tickets();
-        let end = open.next().map(|_| self.settings.time_limit.clone());
-        due.chain(end).min()
-    }
-
-    /// Warns of approaching time-outs, and cancels the actions that have reached theirs.
-    pub(super) fn check_timeouts(&mut self) {
-        let limits: Vec<ActionTimeout> = self.action_timeouts().collect();
-        let (expired, running): (Vec<_>, Vec<_>) =
-            limits.into_iter().partition(|limit| limit.until < self.now);
-        let is_due =
-            |limit: &&ActionTimeout| limit.warn.as_ref().is_some_and(|warn| *warn <= self.now);
-        for limit in running.iter().filter(is_due) {
-            let Some(entry) = self.action_log.get(limit.ticket) else {
-                continue;
-            };
-            self.ports.recorder.record(&Entry::Warning {
-                now: &self.now,
-                ticket: limit.ticket,
-                action: &entry.action.name,
-                until: &limit.until,
-                cause: WarningCause::Timeout,
-            });
-            self.action_log
-                .note_timeout_warning(limit.ticket, &limit.until);
-        }
-        let expired = expired.into_iter().rev();
-        let expired = expired.map(|limit| PendingStep::TimeOut(limit.ticket, limit.until));
-        self.work_queue.extend(expired);
     }
 }

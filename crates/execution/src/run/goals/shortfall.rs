@@ -3,9 +3,10 @@
 
 use std::collections::BTreeSet;
 
-use super::Run;
-use super::goals::OpenGoal;
-use super::snapshot::{GivenGoal, Goals};
+use super::GoalManager;
+use super::open_goal::{GivenGoal, Goals, OpenGoal};
+use elbowroom_model::Task;
+
 use crate::planning::Shortfall;
 use crate::reason::{Cause, Reason, Subject};
 
@@ -36,21 +37,21 @@ impl Conflict {
     }
 }
 
-impl Run<'_> {
+impl GoalManager<'_> {
     /// Records the information about these goals in the planner's answer.
-    pub(super) fn note_shortfall(&mut self, goals: &Goals, shortfall: &Shortfall) {
-        let is_choosing = self.is_selecting_goals();
-        let Some(lasting) = &mut self.goal_manager else {
+    pub(in crate::run) fn note_shortfall(&mut self, goals: &Goals, shortfall: &Shortfall) {
+        if !self.accepts_requests() {
             return;
-        };
+        }
+        let is_choosing = self.is_selecting_goals();
         if !is_choosing {
-            lasting.conflicts.clear();
-            for goal in &mut lasting.goals {
+            self.conflicts.clear();
+            for goal in &mut self.goals {
                 goal.is_proven_late = false;
             }
         }
         if !shortfall.conflict.is_empty() {
-            lasting.conflicts.push(shortfall.conflict.clone());
+            self.conflicts.push(shortfall.conflict.clone());
         }
         let pursued: Vec<&GivenGoal> = goals
             .open
@@ -64,7 +65,7 @@ impl Run<'_> {
                 continue;
             };
             let same = |goal: &&mut OpenGoal| goal.name == given.name && goal.terms == given.terms;
-            let goal = lasting.goals.iter_mut().find(same);
+            let goal = self.goals.iter_mut().find(same);
             let Some((goal, deadline)) = goal.zip(given.terms.deadline.as_ref()) else {
                 continue;
             };
@@ -77,17 +78,14 @@ impl Run<'_> {
     }
 
     /// Returns the known conflicts among the open goals without deadlines.
-    pub(super) fn conflicts(&self) -> Vec<Conflict> {
-        let Some(lasting) = &self.goal_manager else {
-            return Vec::new();
-        };
-        let conflicts = lasting.conflicts.iter().map(|conjuncts| {
+    pub(super) fn conflicts(&self, task: &Task) -> Vec<Conflict> {
+        let conflicts = self.conflicts.iter().map(|conjuncts| {
             let is_member = |goal: &&OpenGoal| {
                 let mut own = goal.ground.conjuncts().into_iter();
                 goal.terms.deadline.is_none()
-                    && own.any(|it| conjuncts.contains(&self.task.describe_condition(it)))
+                    && own.any(|it| conjuncts.contains(&task.describe_condition(it)))
             };
-            let members = lasting.goals.iter().filter(is_member);
+            let members = self.goals.iter().filter(is_member);
             Conflict {
                 goals: members.map(|goal| goal.name.clone()).collect(),
                 conjuncts: conjuncts.clone(),
@@ -96,15 +94,21 @@ impl Run<'_> {
         conflicts.collect()
     }
 
+    /// Returns a known conflict in words.
+    pub(in crate::run) fn first_conflict(&self, task: &Task) -> Option<String> {
+        let conflict = self.conflicts(task).into_iter().next();
+        conflict.map(|conflict| conflict.in_words())
+    }
+
     /// Returns the number of pursued goals.
-    pub(super) fn pursued_goals(&self) -> usize {
-        let goals = self.goal_manager.iter().flat_map(|it| &it.goals);
+    pub(in crate::run) fn pursued_goals(&self) -> usize {
+        let goals = self.goals.iter();
         goals.filter(|goal| goal.is_pursued()).count()
     }
 
     /// Returns the lateness of the pursued goals with deadlines, as far as it is known.
-    pub(super) fn missed_deadlines(&self) -> Vec<Reason> {
-        let goals = self.goal_manager.iter().flat_map(|it| &it.goals);
+    pub(in crate::run) fn missed_deadlines(&self) -> Vec<Reason> {
+        let goals = self.goals.iter();
         let late = goals.filter(|goal| goal.is_pursued()).filter_map(|goal| {
             let late = goal.missed_deadline.as_ref()?;
             let words = format!("`{}` would be reached {late}", goal.name);

@@ -9,15 +9,16 @@
 
 use std::collections::BTreeSet;
 
+use elbowroom_model::Task;
 use elbowroom_num::Rational;
 
-use super::background_search::SearchResults;
-use super::dead_end::unreachable_conditions;
-use super::goals::OpenGoal;
+use super::open_goal::OpenGoal;
 use super::selection::{GoalSet, Selection, SelectionStep};
 use super::shortfall::Conflict;
-use super::{Run, Verdict};
+use super::{GoalContext, GoalManager};
 use crate::record::{Entry, GoalChange};
+use crate::run::reachability::unreachable_conditions;
+use crate::run::settings::Verdict;
 
 /// Maximum number of goals that are listed in a reason.
 const MAX_LISTED_GOALS: usize = 5;
@@ -81,47 +82,40 @@ impl GoalSelection {
     }
 }
 
-impl Run<'_> {
+impl GoalManager<'_> {
     /// Returns `true` while goals are selected.
-    pub(super) fn is_selecting_goals(&self) -> bool {
-        let lasting = self.goal_manager.as_ref();
-        lasting.is_some_and(|lasting| lasting.selection.is_some())
+    pub(in crate::run) fn is_selecting_goals(&self) -> bool {
+        self.selection.is_some()
     }
 
     /// Pursues all open goals again, from the next plan on.
-    pub(super) fn pursue_all(&mut self) {
-        let Some(lasting) = &mut self.goal_manager else {
-            return;
-        };
-        lasting.selection = None;
+    pub(super) fn pursue_all(&mut self, ctx: &mut GoalContext<'_>) {
+        self.selection = None;
         let mut is_changed = false;
-        for goal in &mut lasting.goals {
+        for goal in &mut self.goals {
             is_changed |= goal.set_aside.take().is_some();
             goal.unreachable = None;
         }
         if is_changed {
-            self.set_goal();
+            self.set_goal(ctx);
         }
     }
 
     /// Adds new goals to the selection. If no plan also reaches these, the present plan continues.
-    pub(super) fn add_goals_to_selection(&mut self) {
-        let Some(lasting) = &mut self.goal_manager else {
-            return;
-        };
-        if lasting.planned_goals.is_empty() {
-            if lasting.selection.is_some() {
-                self.restart_selection(true);
+    pub(super) fn add_goals_to_selection(&mut self, ctx: &mut GoalContext<'_>) {
+        if self.planned_goals.is_empty() {
+            if self.selection.is_some() {
+                self.restart_selection(ctx, true);
             }
             return;
         }
-        let choosing = lasting.selection.take();
+        let choosing = self.selection.take();
         let candidates = choosing.map(|choosing| choosing.names);
         let candidates = candidates.unwrap_or_default();
         let (mut planned, mut new) = (Vec::new(), Vec::new());
-        for goal in &mut lasting.goals {
+        for goal in &mut self.goals {
             let known = (goal.name.clone(), goal.terms.value.clone());
-            if lasting.planned_goals.contains(&goal.name) {
+            if self.planned_goals.contains(&goal.name) {
                 planned.push(known);
             } else if goal.is_pursued() || candidates.contains(&goal.name) {
                 goal.set_aside = None;
@@ -130,7 +124,7 @@ impl Run<'_> {
         }
         let greatest = new.iter().map(|(_, value)| value).max();
         let least = planned.iter().map(|(_, value)| value).min();
-        lasting.selection = match (least, greatest) {
+        self.selection = match (least, greatest) {
             (None, _) => None,
             // Goals of the plan may be set aside for more valuable ones.
             (Some(least), Some(greatest)) if greatest > least => {
@@ -148,14 +142,18 @@ impl Run<'_> {
 
     /// Continues with other goals where the run would otherwise become idle with this verdict.
     /// Returns `false` if there are none.
-    pub(super) fn select_goals_after(&mut self, verdict: &Verdict) -> bool {
+    pub(in crate::run) fn select_goals_after(
+        &mut self,
+        ctx: &mut GoalContext<'_>,
+        verdict: &Verdict,
+    ) -> bool {
         match verdict {
-            Verdict::GoalReached => self.pursue_goals_set_aside(),
+            Verdict::GoalReached => self.pursue_goals_set_aside(ctx),
             Verdict::Unsolvable | Verdict::NoPlan { .. } => {
-                self.select_after_closing() || self.select_after_failure()
+                self.select_after_closing(ctx) || self.select_after_failure(ctx)
             }
             _ => {
-                self.pursue_all();
+                self.pursue_all(ctx);
                 false
             }
         }
@@ -163,38 +161,32 @@ impl Run<'_> {
 
     /// Closes the pursued goals, which are achieved, and pursues those that were set aside. Returns
     /// `false` if there are none.
-    fn pursue_goals_set_aside(&mut self) -> bool {
-        self.queue_conflicting_goals();
-        let Some(lasting) = &mut self.goal_manager else {
-            return false;
-        };
-        lasting.selection = None;
-        if lasting.goals.iter().all(OpenGoal::is_pursued) {
+    fn pursue_goals_set_aside(&mut self, ctx: &mut GoalContext<'_>) -> bool {
+        self.queue_conflicting_goals(ctx);
+        self.selection = None;
+        if self.goals.iter().all(OpenGoal::is_pursued) {
             return false;
         }
-        let (achieved, left) = lasting.goals.drain(..).partition(OpenGoal::is_pursued);
-        lasting.goals = left;
+        let (achieved, left) = self.goals.drain(..).partition(OpenGoal::is_pursued);
+        self.goals = left;
         let achieved = self.keep_achieved(achieved);
-        self.record_achieved(&achieved);
-        self.pursue_all();
-        self.announce_goals();
-        self.set_goal();
+        self.record_achieved(ctx, &achieved);
+        self.pursue_all(ctx);
+        self.announce_goals(ctx);
+        self.set_goal(ctx);
         self.drop_plan();
-        self.history.clear();
-        self.initial_belief = self.belief.clone();
-        self.reasons.clear();
-        self.replans = 0;
-        self.search_results = SearchResults::default();
-        self.record_goal_change("the other goals are reached".to_owned(), true);
+        self.has_closed_goals = false;
+        self.effects.are_others_pursued = true;
+        self.record_change(ctx, "the other goals are reached".to_owned(), true);
         true
     }
 
     /// Tries again if goals were closed since the plan was requested, because the others may have a
     /// plan.
-    fn select_after_closing(&mut self) -> bool {
-        let has_closed = std::mem::take(&mut self.search_results.has_closed_goals);
-        if has_closed && !(self.is_selecting_goals() && self.restart_selection(false)) {
-            self.record_goal_change("some goals are reached".to_owned(), true);
+    fn select_after_closing(&mut self, ctx: &mut GoalContext<'_>) -> bool {
+        let has_closed = std::mem::take(&mut self.has_closed_goals);
+        if has_closed && !(self.is_selecting_goals() && self.restart_selection(ctx, false)) {
+            self.record_change(ctx, "some goals are reached".to_owned(), true);
         }
         has_closed
     }
@@ -202,8 +194,8 @@ impl Run<'_> {
     /// Begins a selection among all open goals that can become true. `is_tried` is `true` if no
     /// plan was found for all of them; if there are many goals, all of them are not tried together.
     /// Returns `false` if no goal can become true.
-    pub(super) fn restart_selection(&mut self, is_tried: bool) -> bool {
-        let mut choosing = GoalSelection::among_goals(self.set_unreachable_goals_aside());
+    pub(super) fn restart_selection(&mut self, ctx: &mut GoalContext<'_>, is_tried: bool) -> bool {
+        let mut choosing = GoalSelection::among_goals(self.set_unreachable_goals_aside(ctx));
         let all = choosing.tried.clone();
         let is_tried = is_tried || matches!(choosing.selection, Selection::Growth(_));
         let step = if is_tried {
@@ -211,56 +203,55 @@ impl Run<'_> {
         } else {
             SelectionStep::Try(all)
         };
-        self.pursue_selection_step(choosing, step, true)
+        self.pursue_selection_step(ctx, choosing, step, true)
     }
 
     /// Selects among all goals if no plan was found and goals were added since the request.
-    pub(super) fn select_after_added_goals(&mut self) {
+    pub(in crate::run) fn select_after_added_goals(&mut self, ctx: &mut GoalContext<'_>) {
         if self.has_abandoned_goals() == Some(false) && !self.is_selecting_goals() {
-            self.select_after_failure();
+            self.select_after_failure(ctx);
         }
     }
 
     /// Selects other goals after no plan was found for the pursued ones.
-    fn select_after_failure(&mut self) -> bool {
-        let Some(lasting) = &mut self.goal_manager else {
-            return false;
-        };
-        if let Some(mut choosing) = lasting.selection.take() {
-            self.record_unreachable_goals();
-            self.note_proofs(&mut choosing);
+    fn select_after_failure(&mut self, ctx: &mut GoalContext<'_>) -> bool {
+        if let Some(mut choosing) = self.selection.take() {
+            self.record_unreachable_goals(ctx);
+            self.note_proofs(ctx.task, &mut choosing);
             let step = choosing.selection.after_failure(choosing.tried.clone());
-            return self.pursue_selection_step(choosing, step, true);
+            return self.pursue_selection_step(ctx, choosing, step, true);
         }
-        if lasting.goals.len() < 2 {
+        if self.goals.len() < 2 {
             return false;
         }
-        let tried = lasting.goals.iter().filter(|goal| goal.is_pursued());
+        let tried = self.goals.iter().filter(|goal| goal.is_pursued());
         let tried: BTreeSet<String> = tried.map(|goal| goal.name.clone()).collect();
-        let mut choosing = GoalSelection::among_goals(self.set_unreachable_goals_aside());
-        self.note_proofs(&mut choosing);
+        let mut choosing = GoalSelection::among_goals(self.set_unreachable_goals_aside(ctx));
+        self.note_proofs(ctx.task, &mut choosing);
         let positions = tried.iter().map(|name| choosing.position(name));
         let step = match positions.collect::<Option<GoalSet>>() {
             Some(tried) => choosing.selection.after_failure(tried),
             // Some goals can never become true.
             None => SelectionStep::Try(choosing.tried.clone()),
         };
-        self.pursue_selection_step(choosing, step, true)
+        self.pursue_selection_step(ctx, choosing, step, true)
     }
 
     /// Excludes from a selection the sets of goals that are proven to have no plan.
-    fn note_proofs(&self, choosing: &mut GoalSelection) {
-        let goals = self.goal_manager.as_ref().map(|it| &it.goals[..]);
-        choosing.note_proofs(&self.conflicts(), goals.unwrap_or_default());
+    fn note_proofs(&self, task: &Task, choosing: &mut GoalSelection) {
+        choosing.note_proofs(&self.conflicts(task), &self.goals);
     }
 
     /// Sets aside the open goals that can never become true. Returns the names and values of the
     /// others; those with deadlines come first, in the order of their deadlines.
-    fn set_unreachable_goals_aside(&mut self) -> Vec<(String, Rational)> {
-        self.pursue_all();
-        self.record_unreachable_goals();
+    fn set_unreachable_goals_aside(
+        &mut self,
+        ctx: &mut GoalContext<'_>,
+    ) -> Vec<(String, Rational)> {
+        self.pursue_all(ctx);
+        self.record_unreachable_goals(ctx);
         let mut others = Vec::new();
-        for goal in self.goal_manager.iter_mut().flat_map(|it| &mut it.goals) {
+        for goal in self.goals.iter_mut() {
             goal.set_aside.clone_from(&goal.unreachable);
             if goal.is_pursued() {
                 others.push(&*goal);
@@ -277,24 +268,21 @@ impl Run<'_> {
     }
 
     /// Records the pursued goals that can never become true.
-    fn record_unreachable_goals(&mut self) {
-        let hopeless = unreachable_conditions(&self.belief);
-        let goals = self.goal_manager.iter_mut().flat_map(|it| &mut it.goals);
+    fn record_unreachable_goals(&mut self, ctx: &mut GoalContext<'_>) {
+        let hopeless = unreachable_conditions(ctx.belief);
+        let goals = self.goals.iter_mut();
         for goal in goals.filter(|goal| goal.is_pursued()) {
             let parts = goal.ground.conjuncts().into_iter();
             let lost = parts.filter(|part| hopeless.contains(part));
-            let lost: Vec<String> = lost.map(|it| self.task.describe_condition(it)).collect();
+            let lost: Vec<String> = lost.map(|it| ctx.task.describe_condition(it)).collect();
             let why = || format!("{} can never become true", lost.join(", "));
             goal.unreachable = (!lost.is_empty()).then(why);
         }
     }
 
     /// Continues a selection that was waiting for a plan to begin.
-    pub(super) fn select_after_success(&mut self) {
-        let Some(lasting) = &mut self.goal_manager else {
-            return;
-        };
-        let (goals, planned) = (&lasting.goals, &lasting.planned_goals);
+    pub(super) fn select_after_success(&mut self, ctx: &mut GoalContext<'_>) {
+        let (goals, planned) = (&self.goals, &self.planned_goals);
         let is_tried = |choosing: &mut GoalSelection| {
             let tried = choosing.open(&choosing.tried, goals);
             let open = goals.iter().map(|goal| &goal.name);
@@ -302,51 +290,46 @@ impl Run<'_> {
                 .iter()
                 .eq(planned.intersection(&open.cloned().collect()))
         };
-        if let Some(mut choosing) = lasting.selection.take_if(is_tried) {
+        if let Some(mut choosing) = self.selection.take_if(is_tried) {
             let step = choosing.selection.after_success(choosing.tried.clone());
-            self.pursue_selection_step(choosing, step, false);
-        } else if lasting.selection.is_none() {
-            self.announce_goals();
+            self.pursue_selection_step(ctx, choosing, step, false);
+        } else if self.selection.is_none() {
+            self.announce_goals(ctx);
         }
     }
 
     /// Leaves out the new goals if no plan reaches them in addition to those of the present plan,
     /// which continues. Returns `false` if the failure has another reason.
-    pub(super) fn exclude_new_goals(&mut self) -> bool {
-        if self.select_after_closing() {
+    pub(in crate::run) fn exclude_new_goals(&mut self, ctx: &mut GoalContext<'_>) -> bool {
+        if self.select_after_closing(ctx) {
             return true;
         }
-        let Some(lasting) = &mut self.goal_manager else {
+        let has_plan = self.plan.is_some();
+        let Some(mut choosing) = self.selection.take_if(|_| has_plan) else {
             return false;
         };
-        let has_plan = lasting.plan.is_some();
-        let Some(mut choosing) = lasting.selection.take_if(|_| has_plan) else {
-            return false;
-        };
-        self.record_unreachable_goals();
-        self.note_proofs(&mut choosing);
+        self.record_unreachable_goals(ctx);
+        self.note_proofs(ctx.task, &mut choosing);
         let step = choosing.selection.after_failure(choosing.tried.clone());
-        self.pursue_selection_step(choosing, step, false)
+        self.pursue_selection_step(ctx, choosing, step, false)
     }
 
     /// Pursues the goals of the next step. Returns `false` if there is no plan for any goal. A plan
     /// is requested or kept if the step tries goals, or if `is_to_plan` for the selected ones.
     fn pursue_selection_step(
         &mut self,
+        ctx: &mut GoalContext<'_>,
         mut choosing: GoalSelection,
         mut step: SelectionStep,
         is_to_plan: bool,
     ) -> bool {
-        let conflicts = self.conflicts();
-        let Some(lasting) = &mut self.goal_manager else {
-            return false;
-        };
+        let conflicts = self.conflicts(ctx.task);
         let (set, pursued, is_last) = loop {
             let (set, is_last) = match step {
                 SelectionStep::Try(set) => (set, false),
                 SelectionStep::Select(set) => (set, true),
             };
-            let pursued = choosing.open(&set, &lasting.goals);
+            let pursued = choosing.open(&set, &self.goals);
             if is_last || !pursued.is_empty() {
                 break (set, pursued, is_last);
             }
@@ -355,11 +338,11 @@ impl Run<'_> {
         };
         if pursued.is_empty() {
             // Goals that can never become true keep their own reasons in the idle state.
-            self.set_unreachable_goals_aside();
+            self.set_unreachable_goals_aside(ctx);
             return false;
         }
         let list = self::list(&choosing, &set, &pursued);
-        let candidates = lasting.goals.iter_mut();
+        let candidates = self.goals.iter_mut();
         for goal in candidates.filter(|goal| choosing.names.contains(&goal.name)) {
             let is_aside = !pursued.contains(&goal.name);
             let position = choosing.position(&goal.name).unwrap_or_default();
@@ -391,24 +374,21 @@ impl Run<'_> {
         }
         choosing.tried = set;
         let is_lengthy = matches!(choosing.selection, Selection::Growth(_));
-        lasting.selection = (!is_last).then_some(choosing);
+        self.selection = (!is_last).then_some(choosing);
         if is_last || is_lengthy {
-            self.announce_goals();
+            self.announce_goals(ctx);
         }
         if is_last && !is_to_plan {
-            self.set_goal();
+            self.set_goal(ctx);
         } else {
-            self.record_goal_change(format!("pursued from now on: {list}"), true);
+            self.record_change(ctx, format!("pursued from now on: {list}"), true);
         }
         true
     }
 
     /// Records the goals that are set aside, and those that are pursued again.
-    pub(super) fn announce_goals(&mut self) {
-        let Some(lasting) = &mut self.goal_manager else {
-            return;
-        };
-        for goal in &mut lasting.goals {
+    pub(in crate::run) fn announce_goals(&mut self, ctx: &mut GoalContext<'_>) {
+        for goal in &mut self.goals {
             if goal.is_announced == goal.set_aside.is_some() {
                 continue;
             }
@@ -417,8 +397,8 @@ impl Run<'_> {
                 Some(why) => GoalChange::SetAside { why },
                 None => GoalChange::Pursued,
             };
-            self.ports.recorder.record(&Entry::Goal {
-                now: &self.now,
+            ctx.recorder.record(&Entry::Goal {
+                now: ctx.now,
                 name: &goal.name,
                 change,
             });

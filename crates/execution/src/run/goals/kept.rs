@@ -9,23 +9,10 @@
 
 use elbowroom_num::Rational;
 
-use super::goals::OpenGoal;
-use super::{BeliefState, Run};
+use super::open_goal::{OpenGoal, Wait};
+use super::{GoalContext, GoalManager};
+use crate::belief_state::BeliefState;
 use crate::record::{Entry, GoalChange};
-
-/// Reason for which a goal is queued.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Wait {
-    /// Its release time has not come, or it was not evaluated since.
-    #[default]
-    Release,
-    /// It is a goal to keep, and holds.
-    Holds,
-    /// It is a goal to keep, and does not hold, but other goals are pursued.
-    Others,
-    /// It is a goal to keep, and no plan reaches it together with the other ones.
-    Conflict,
-}
 
 /// Reason for which a goal to keep is queued although it does not hold.
 const OTHERS: &str = "it does not hold, but other goals are pursued first";
@@ -51,23 +38,23 @@ impl OpenGoal {
     }
 }
 
-impl Run<'_> {
+impl GoalManager<'_> {
     /// Returns `true` if there are released goals to keep that are not pursued now.
-    pub(super) fn has_watched_goals(&self) -> bool {
-        let mut queued = self.goal_manager.iter().flat_map(|it| &it.queued);
-        queued.any(|goal| goal.is_watched(&self.now))
+    pub(in crate::run) fn has_watched_goals(&self, now: &Rational) -> bool {
+        let mut queued = self.queued.iter();
+        queued.any(|goal| goal.is_watched(now))
     }
 
     /// Returns `true` if a goal to keep is queued because no plan reaches it with the others.
-    pub(super) fn has_conflicting_goals(&self) -> bool {
-        let mut queued = self.goal_manager.iter().flat_map(|it| &it.queued);
+    pub(in crate::run) fn has_conflicting_goals(&self) -> bool {
+        let mut queued = self.queued.iter();
         queued.any(|goal| goal.wait == Wait::Conflict)
     }
 
     /// Lets the goals to keep that excluded each other be tried again, because the situation or the
     /// goals have changed.
     pub(super) fn retry_conflicting_goals(&mut self) {
-        let queued = self.goal_manager.iter_mut().flat_map(|it| &mut it.queued);
+        let queued = self.queued.iter_mut();
         for goal in queued.filter(|goal| goal.wait == Wait::Conflict) {
             (goal.wait, goal.set_aside) = (Wait::Release, None);
         }
@@ -75,22 +62,19 @@ impl Run<'_> {
 
     /// Evaluates the queued goals to keep. Pursues them if one does not hold and no other goal is
     /// pursued.
-    pub(super) fn tend_kept_goals(&mut self) {
+    pub(in crate::run) fn tend_kept_goals(&mut self, ctx: &mut GoalContext<'_>) {
         // A change of the goals ends the idle state.
-        let is_idle = self.idle_since_and_proof().is_some() && !self.is_goal_change_pending();
-        let Some(lasting) = &mut self.goal_manager else {
-            return;
-        };
-        let is_free = is_idle || lasting.goals.iter().all(|goal| goal.terms.keep);
-        let (now, belief) = (&self.now, &self.belief);
+        let is_idle = self.idle_since().is_some() && !self.is_change_pending();
+        let is_free = is_idle || self.goals.iter().all(|goal| goal.terms.keep);
+        let (now, belief) = (ctx.now, &ctx.belief);
         let is_violated = |goal: &OpenGoal| {
             goal.is_watched(now) && goal.wait != Wait::Conflict && !goal.holds(belief)
         };
-        if is_free && lasting.queued.iter().any(is_violated) {
-            self.pursue_kept_goals();
+        if is_free && self.queued.iter().any(is_violated) {
+            self.pursue_kept_goals(ctx);
             return;
         }
-        for goal in lasting.queued.iter_mut().filter(|it| it.is_watched(now)) {
+        for goal in self.queued.iter_mut().filter(|it| it.is_watched(now)) {
             let wait = if goal.holds(belief) {
                 Wait::Holds
             } else if goal.wait == Wait::Conflict {
@@ -102,7 +86,7 @@ impl Run<'_> {
                 continue;
             }
             goal.set_aside = None;
-            self.ports.recorder.record(&Entry::Goal {
+            ctx.recorder.record(&Entry::Goal {
                 now,
                 name: &goal.name,
                 change: match wait {
@@ -114,26 +98,24 @@ impl Run<'_> {
     }
 
     /// Pursues all goals to keep, including those that hold.
-    pub(super) fn pursue_kept_goals(&mut self) {
-        let Some(lasting) = &mut self.goal_manager else {
-            return;
-        };
-        let (now, belief) = (&self.now, &self.belief);
+    pub(in crate::run) fn pursue_kept_goals(&mut self, ctx: &mut GoalContext<'_>) {
+        let (now, belief) = (ctx.now, &ctx.belief);
         let is_watched = |goal: &mut OpenGoal| goal.is_watched(now);
-        let opened: Vec<OpenGoal> = lasting.queued.extract_if(.., is_watched).collect();
+        let opened: Vec<OpenGoal> = self.queued.extract_if(.., is_watched).collect();
         let violated = opened.iter().filter(|goal| !goal.holds(belief));
         let names: Vec<String> = violated.map(|goal| format!("`{}`", goal.name)).collect();
         for goal in &opened {
-            self.ports.recorder.record(&Entry::Goal {
+            ctx.recorder.record(&Entry::Goal {
                 now,
                 name: &goal.name,
                 change: GoalChange::Pursued,
             });
         }
         let opened = opened.into_iter().map(OpenGoal::unevaluated);
-        lasting.goals.extend(opened);
-        self.pursue_all();
-        self.record_goal_change(
+        self.goals.extend(opened);
+        self.pursue_all(ctx);
+        self.record_change(
+            ctx,
             format!("{} does not hold and is to be kept", names.join(", ")),
             false,
         );
@@ -142,34 +124,28 @@ impl Run<'_> {
     /// Queues the pursued goals to keep, because another goal was added. Returns `true` if there
     /// are any.
     pub(super) fn queue_kept_goals(&mut self) -> bool {
-        let Some(lasting) = &mut self.goal_manager else {
-            return false;
-        };
         let is_kept = |goal: &mut OpenGoal| goal.terms.keep;
-        let kept = lasting.goals.extract_if(.., is_kept);
+        let kept = self.goals.extract_if(.., is_kept);
         let kept: Vec<OpenGoal> = kept.map(OpenGoal::unevaluated).collect();
         let is_any = !kept.is_empty();
-        lasting.queued.extend(kept);
+        self.queued.extend(kept);
         is_any
     }
 
     /// Queues the goals to keep that are set aside, with the reasons, because the pursued goals are
     /// achieved.
-    pub(super) fn queue_conflicting_goals(&mut self) {
-        let Some(lasting) = &mut self.goal_manager else {
-            return;
-        };
+    pub(super) fn queue_conflicting_goals(&mut self, ctx: &mut GoalContext<'_>) {
         let is_conflicting = |goal: &mut OpenGoal| goal.terms.keep && !goal.is_pursued();
-        for goal in lasting.goals.extract_if(.., is_conflicting) {
-            self.ports.recorder.record(&Entry::Goal {
-                now: &self.now,
+        for goal in self.goals.extract_if(.., is_conflicting) {
+            ctx.recorder.record(&Entry::Goal {
+                now: ctx.now,
                 name: &goal.name,
                 change: GoalChange::Queued {
                     why: goal.set_aside.as_deref().unwrap_or_default(),
                 },
             });
             let (wait, is_announced) = (Wait::Conflict, false);
-            lasting.queued.push(OpenGoal {
+            self.queued.push(OpenGoal {
                 is_announced,
                 wait,
                 ..goal
@@ -180,11 +156,9 @@ impl Run<'_> {
     /// Queues the goals to keep among these, which are achieved. Returns the others.
     pub(super) fn keep_achieved(&mut self, achieved: Vec<OpenGoal>) -> Vec<OpenGoal> {
         let (kept, others): (Vec<_>, Vec<_>) = achieved.into_iter().partition(|it| it.terms.keep);
-        if let Some(lasting) = &mut self.goal_manager {
-            // Before those that they exclude: of goals with equal values, the first one is selected.
-            let kept = kept.into_iter().map(OpenGoal::unevaluated);
-            lasting.queued.splice(0..0, kept);
-        }
+        // Before those that they exclude: of goals with equal values, the first one is selected.
+        let kept = kept.into_iter().map(OpenGoal::unevaluated);
+        self.queued.splice(0..0, kept);
         others
     }
 }

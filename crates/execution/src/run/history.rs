@@ -1,18 +1,18 @@
-//! Explanation of a dead end: the parts of the goal that can never become true again, and since
+//! History of a run, and explanation of a dead end: the parts of the goal that can never become true again, and since
 //! when.
 //!
-//! [`reachability`] computes an upper bound on the facts that can become true, ignoring deletions
-//! and time. No plan can reach anything else. The history of the run is replayed to find the event
-//! that made part of the goal unreachable.
+//! The history of the run is replayed to find the event that made part of the goal
+//! [unreachable](super::reachability).
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use elbowroom_model::Task;
 use elbowroom_model::ground::{Condition, FactId, FluentId};
-use elbowroom_model::{Situation, Task, reachability};
-use elbowroom_num::{Interval, Rational};
+use elbowroom_num::Rational;
 
-use super::{ActionLog, Run};
+use super::action_log::ActionLog;
+use super::reachability::{MAX_STEPS, unreachable};
 use crate::belief_state::BeliefState;
 use crate::event::{ActionHandle, Ending};
 use crate::reason::{Cause, Evidence, Reason, Subject, TimedChange};
@@ -36,43 +36,86 @@ pub(super) enum BelievedEventKind {
     Value(FluentId, Rational),
 }
 
-/// Limit on the work of reachability for an explanation: about a second.
-const MAX_STEPS: u64 = 10_000_000;
-
-/// The same limit for [`is_goal_unreachable`], which delays the run: about a tenth of a second.
-const MAX_STEPS_DURING_RUN: u64 = 1_000_000;
+/// Number of events that are kept. If an earlier event made a goal unreachable, the explanation says
+/// that the goal was never reachable.
+const MAX_EVENTS: usize = 1000;
 
 /// Limit on the number of parts of the goal that are explained.
 const MAX_EXPLAINED_PARTS: usize = 3;
 
-impl Run<'_> {
-    /// Records an observation that was believed, for a later explanation of a dead end.
-    pub(super) fn record_believed_event(&mut self, time: &Rational, what: BelievedEventKind) {
-        self.search_results.failed_at = None;
-        if !matches!(what, BelievedEventKind::Stopped(_)) {
-            self.refusal_backoff.reset();
-        }
-        if self.is_explaining {
-            self.history.push(BelievedEvent {
-                time: time.clone(),
-                kind: what,
-            });
+/// The believed observations of a run, for the explanation of a dead end.
+pub(super) struct History {
+    /// The belief before the first event.
+    initial_belief: BeliefState,
+    /// All believed observations, in order; none if nothing is to be explained.
+    events: Vec<BelievedEvent>,
+    is_explaining: bool,
+}
+
+impl History {
+    /// Creates the history of a run that begins with this belief.
+    pub(super) fn new(initial_belief: BeliefState) -> Self {
+        Self {
+            initial_belief,
+            events: Vec::new(),
+            is_explaining: false,
         }
     }
 
-    /// Returns the parts of the goal that can never become true again, and since when.
-    pub(super) fn dead_end(&self) -> Vec<Reason> {
-        let mut past = self.run_history();
-        let mut present = past.belief_after(self.history.len());
-        let _ = present.advance(&self.now);
+    /// Keeps the events from now on.
+    pub(super) fn explain(&mut self) {
+        self.is_explaining = true;
+    }
+
+    /// Returns `true` if dead ends are to be explained.
+    pub(super) fn is_explaining(&self) -> bool {
+        self.is_explaining
+    }
+
+    /// Records an observation that was believed.
+    pub(super) fn record(&mut self, time: &Rational, kind: BelievedEventKind) {
+        if self.is_explaining {
+            let time = time.clone();
+            self.events.push(BelievedEvent { time, kind });
+        }
+    }
+
+    /// Forgets all events. The history begins again with this belief.
+    pub(super) fn restart(&mut self, belief: &BeliefState) {
+        self.events.clear();
+        self.initial_belief = belief.clone();
+    }
+
+    /// Forgets the earliest events when there are very many.
+    pub(super) fn prune(&mut self, belief: &BeliefState, log: &ActionLog, now: &Rational) {
+        // Only at twice the limit, so that it rarely happens.
+        if self.events.len() >= 2 * MAX_EVENTS {
+            let past = self.events.len() - MAX_EVENTS;
+            let initial_belief = self.replay(belief, log, now).belief_after(past);
+            self.initial_belief = initial_belief;
+            self.events.drain(..past);
+        }
+    }
+
+    /// Returns the parts of the goal that can never become true again, and since when. Without such
+    /// a part, names the goals that exclude each other (`conflict`).
+    pub(super) fn dead_end(
+        &self,
+        belief: &BeliefState,
+        log: &ActionLog,
+        now: &Rational,
+        conflict: Option<String>,
+    ) -> Vec<Reason> {
+        let mut past = self.replay(belief, log, now);
+        let mut present = past.belief_after(self.events.len());
+        let _ = present.advance(now);
         let Some(lost) = unreachable(&present, MAX_STEPS) else {
             return Vec::new();
         };
         if lost.is_empty() {
-            let conflict = self.conflicts().into_iter().next();
             let reason = Reason::new(Cause::NotTogether);
             return vec![match conflict {
-                Some(conflict) => reason.about(Subject::ExternalMessage(conflict.in_words())),
+                Some(conflict) => reason.about(Subject::ExternalMessage(conflict)),
                 None => reason,
             }];
         }
@@ -83,25 +126,25 @@ impl Run<'_> {
         explained.collect()
     }
 
-    /// Returns the belief after the first `count` events of the history.
-    pub(super) fn believed_after(&self, count: usize) -> BeliefState {
-        self.run_history().belief_after(count)
-    }
-
-    fn run_history(&self) -> RunHistory<'_> {
-        RunHistory {
-            task: self.belief.task(),
+    fn replay<'h>(
+        &'h self,
+        belief: &'h BeliefState,
+        log: &'h ActionLog,
+        now: &'h Rational,
+    ) -> Replay<'h> {
+        Replay {
+            task: belief.task(),
             initial_belief: &self.initial_belief,
-            history: &self.history,
-            account: &self.action_log,
-            now: &self.now,
+            history: &self.events,
+            account: log,
+            now,
             unreachable_parts: BTreeMap::new(),
         }
     }
 }
 
 /// Queries about the history of a run.
-struct RunHistory<'a> {
+struct Replay<'a> {
     task: &'a Arc<Task>,
     initial_belief: &'a BeliefState,
     history: &'a [BelievedEvent],
@@ -111,7 +154,7 @@ struct RunHistory<'a> {
     unreachable_parts: BTreeMap<usize, Option<Vec<Condition>>>,
 }
 
-impl RunHistory<'_> {
+impl Replay<'_> {
     /// Returns the parts of the goal that were unreachable after the first `count` events, if that
     /// can be computed.
     fn unreachable_after(&mut self, count: usize) -> Option<Vec<Condition>> {
@@ -277,38 +320,4 @@ fn with_event(reason: Reason, event: Evidence, time: Rational) -> Reason {
 
 fn is_unreachable(state: &BeliefState, goal: &Condition) -> bool {
     unreachable(state, MAX_STEPS).is_some_and(|lost| lost.contains(goal))
-}
-
-/// Returns `true` if part of the goal can never become true any more, and `false` if that cannot be
-/// decided within a small limit.
-pub(super) fn is_goal_unreachable(state: &BeliefState) -> bool {
-    unreachable(state, MAX_STEPS_DURING_RUN).is_some_and(|lost| !lost.is_empty())
-}
-
-/// Returns the parts of the goal that can never become true any more, as far as that can be decided
-/// within a small limit.
-pub(super) fn unreachable_conditions(state: &BeliefState) -> Vec<Condition> {
-    unreachable(state, MAX_STEPS_DURING_RUN).unwrap_or_default()
-}
-
-/// Returns the unreachable parts of the goal, if they can be computed within the limit.
-fn unreachable(state: &BeliefState, step_limit: u64) -> Option<Vec<Condition>> {
-    let running = state.running().values().map(|underway| {
-        let duration = Interval::point(underway.planned.clone());
-        state.running_action(underway, duration)
-    });
-    let situation = Situation {
-        time: state.time().clone(),
-        state: state.state(),
-        running: running.collect(),
-    };
-    let task = Task::starting_from(state.task(), &situation);
-    let settings = reachability::Settings {
-        step_limit,
-        ..reachability::Settings::default()
-    };
-    match reachability::ground(&task, &settings) {
-        reachability::Answer::Complete(grounding) => Some(grounding.unreachable_goals),
-        reachability::Answer::LimitReached => None,
-    }
 }

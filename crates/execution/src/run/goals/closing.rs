@@ -4,96 +4,94 @@ use std::collections::BTreeSet;
 
 use elbowroom_num::Rational;
 
-use super::Run;
 use super::goal_selection::names_of;
-use super::goals::OpenGoal;
+use super::open_goal::OpenGoal;
+use super::{GoalContext, GoalManager};
 use crate::record::{Entry, GoalChange};
 
-impl Run<'_> {
+impl GoalManager<'_> {
     /// Closes the goals that are achieved while others are still pursued.
-    pub(super) fn close_achieved_goals(&mut self) {
-        let Some(lasting) = self.goal_manager.as_mut().filter(|it| it.goals.len() > 1) else {
+    pub(in crate::run) fn close_achieved_goals(&mut self, ctx: &mut GoalContext<'_>) {
+        if self.goals.len() < 2 {
             return;
-        };
-        let belief = &self.belief;
+        }
+        let belief = &ctx.belief;
         // Goals to keep have to hold together in the end.
         let is_achieved =
             |goal: &OpenGoal| !goal.terms.keep && belief.is_certain(&goal.ground) == Ok(true);
         let is_left = |goal: &OpenGoal| goal.is_pursued() && !is_achieved(goal);
-        if !lasting.goals.iter().any(is_left) || !lasting.goals.iter().any(is_achieved) {
+        if !self.goals.iter().any(is_left) || !self.goals.iter().any(is_achieved) {
             return;
         }
-        let (achieved, left): (Vec<_>, Vec<_>) = lasting.goals.drain(..).partition(is_achieved);
-        lasting.goals = left;
-        self.continue_without(&achieved);
+        let (achieved, left): (Vec<_>, Vec<_>) = self.goals.drain(..).partition(is_achieved);
+        self.goals = left;
+        self.continue_without(ctx, &achieved);
     }
 
     /// Continues with the other goals after these were achieved.
-    fn continue_without(&mut self, achieved: &[OpenGoal]) {
-        self.search_results.has_closed_goals = self.search.is_some();
-        self.record_achieved(achieved);
-        self.set_goal();
-        if self.search.is_none() && self.is_selecting_goals() {
+    fn continue_without(&mut self, ctx: &mut GoalContext<'_>, achieved: &[OpenGoal]) {
+        self.has_closed_goals = ctx.is_searching;
+        self.record_achieved(ctx, achieved);
+        self.set_goal(ctx);
+        if !ctx.is_searching && self.is_selecting_goals() {
             // Without the closed goals, more sets may have a plan.
-            self.restart_selection(false);
+            self.restart_selection(ctx, false);
         }
     }
 
     /// Returns the next coming deadline of an open goal.
-    pub(super) fn next_deadline_of_a_goal(&self) -> Option<Rational> {
-        let goals = self.goal_manager.iter().flat_map(|it| &it.goals);
+    pub(in crate::run) fn next_deadline(&self, now: &Rational) -> Option<Rational> {
+        let goals = self.goals.iter();
         let deadlines = goals.filter_map(|goal| goal.terms.deadline.as_ref());
-        deadlines.filter(|it| **it > self.now).min().cloned()
+        deadlines.filter(|it| *it > now).min().cloned()
     }
 
     /// Closes the goals whose deadlines are before this time, in their order. All events up to the
     /// deadlines must be known.
-    pub(super) fn close_goals_due_before(&mut self, time: &Rational) {
-        let goals = self.goal_manager.iter().flat_map(|it| &it.goals);
+    pub(in crate::run) fn close_goals_due_before(
+        &mut self,
+        ctx: &mut GoalContext<'_>,
+        time: &Rational,
+    ) {
+        let goals = self.goals.iter();
         let deadlines = goals.filter_map(|goal| goal.terms.deadline.clone());
         let due: BTreeSet<Rational> = deadlines.filter(|it| it < time).collect();
         for deadline in due {
-            let _ = self.belief.advance(&deadline);
-            self.close_goals_due(&deadline);
+            let _ = ctx.belief.advance(&deadline);
+            self.close_goals_due(ctx, &deadline);
         }
     }
 
     /// Closes achieved goals with deadlines, because they need not stay true, and goals whose
     /// deadlines are now.
-    pub(super) fn close_momentary_goals(&mut self) {
-        let Some(lasting) = &mut self.goal_manager else {
-            return;
-        };
-        let belief = &self.belief;
+    pub(in crate::run) fn close_momentary_goals(&mut self, ctx: &mut GoalContext<'_>) {
+        let belief = &ctx.belief;
         let is_achieved = |goal: &mut OpenGoal| {
             goal.terms.deadline.is_some() && belief.is_certain(&goal.ground) == Ok(true)
         };
-        let achieved: Vec<OpenGoal> = lasting.goals.extract_if(.., is_achieved).collect();
-        let is_any_left = lasting.goals.iter().any(OpenGoal::is_pursued);
+        let achieved: Vec<OpenGoal> = self.goals.extract_if(.., is_achieved).collect();
+        let is_any_left = self.goals.iter().any(OpenGoal::is_pursued);
         match names_of(&achieved) {
-            Some(_) if is_any_left => self.continue_without(&achieved),
+            Some(_) if is_any_left => self.continue_without(ctx, &achieved),
             Some(names) => {
-                self.record_achieved(&achieved);
-                self.pursue_all();
-                self.record_goal_change(format!("{names} is reached"), false);
+                self.record_achieved(ctx, &achieved);
+                self.pursue_all(ctx);
+                self.record_change(ctx, format!("{names} is reached"), false);
             }
             None => {}
         }
-        self.close_goals_due(&self.now.clone());
+        self.close_goals_due(ctx, ctx.now);
     }
 
     /// Closes the goals with deadlines up to this time. The others are pursued without them.
-    fn close_goals_due(&mut self, time: &Rational) {
-        let Some(lasting) = &mut self.goal_manager else {
-            return;
-        };
+    fn close_goals_due(&mut self, ctx: &mut GoalContext<'_>, time: &Rational) {
         let is_due =
             |goal: &mut OpenGoal| goal.terms.deadline.as_ref().is_some_and(|it| it <= time);
-        let due: Vec<OpenGoal> = lasting.goals.extract_if(.., is_due).collect();
+        let due: Vec<OpenGoal> = self.goals.extract_if(.., is_due).collect();
         // A goal may have been achieved exactly at its deadline.
-        let is_achieved = |goal: &OpenGoal| self.belief.is_certain(&goal.ground) == Ok(true);
+        let is_achieved = |goal: &OpenGoal| ctx.belief.is_certain(&goal.ground) == Ok(true);
         let (achieved, late): (Vec<_>, Vec<_>) = due.into_iter().partition(is_achieved);
-        self.record_achieved(&achieved);
+        self.record_achieved(ctx, &achieved);
         for goal in &late {
             let why = match &goal.set_aside {
                 Some(aside) => format!("its deadline has passed; it was set aside: {aside}"),
@@ -104,8 +102,8 @@ impl Run<'_> {
                     None => "its deadline has passed".to_owned(),
                 },
             };
-            self.ports.recorder.record(&Entry::Goal {
-                now: &self.now,
+            ctx.recorder.record(&Entry::Goal {
+                now: ctx.now,
                 name: &goal.name,
                 change: GoalChange::Failed { why: &why },
             });
@@ -118,20 +116,17 @@ impl Run<'_> {
             (None, Some(achieved)) => format!("{achieved} is reached"),
             (None, None) => return,
         };
-        self.pursue_all();
-        self.record_goal_change(words, false);
+        self.pursue_all(ctx);
+        self.record_change(ctx, words, false);
     }
 
     /// Returns `true` if these closed goals were set aside, and others are pursued: their plan, or the search for it,
     /// continues. The closed goals are not tried any more.
     fn are_set_aside_while_others_are_pursued(&mut self, closed: &[OpenGoal]) -> bool {
-        let Some(lasting) = &mut self.goal_manager else {
-            return false;
-        };
         let is_unchanged = !closed.iter().any(OpenGoal::is_pursued)
-            && lasting.goals.iter().any(OpenGoal::is_pursued)
-            && lasting.idle_since.is_none();
-        if is_unchanged && let Some(choosing) = &mut lasting.selection {
+            && self.goals.iter().any(OpenGoal::is_pursued)
+            && self.idle_since.is_none();
+        if is_unchanged && let Some(choosing) = &mut self.selection {
             for goal in closed {
                 choosing.exclude(&goal.name);
             }
@@ -139,10 +134,10 @@ impl Run<'_> {
         is_unchanged
     }
 
-    pub(super) fn record_achieved(&mut self, goals: &[OpenGoal]) {
+    pub(super) fn record_achieved(&self, ctx: &mut GoalContext<'_>, goals: &[OpenGoal]) {
         for goal in goals {
-            self.ports.recorder.record(&Entry::Goal {
-                now: &self.now,
+            ctx.recorder.record(&Entry::Goal {
+                now: ctx.now,
                 name: &goal.name,
                 change: GoalChange::Achieved,
             });

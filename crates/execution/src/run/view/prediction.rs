@@ -12,26 +12,26 @@ use elbowroom_model::ground::{Action, Body};
 use elbowroom_model::{Situation, Step};
 use elbowroom_num::{Interval, Rational};
 
-use super::Run;
-use super::situation::{OverrunEstimate, quarter_longer_end, situation_at};
-use super::start_dependencies::StepEvent;
+use super::RunView;
 use crate::belief_state::{BeliefState, RunningActionState};
 use crate::event::ActionHandle;
 use crate::executor::{PlanForm, StepId};
+use crate::run::situation::{OverrunEstimate, quarter_longer_end, situation_at};
+use crate::run::start_dependencies::StepEvent;
 
 /// An expected start of the present plan.
 #[derive(Clone, Debug)]
-pub(super) struct ExpectedStart {
+pub(in crate::run) struct ExpectedStart {
     /// Its ticket in the expected situation.
-    pub(super) ticket: ActionHandle,
-    pub(super) step: StepId,
+    pub(in crate::run) ticket: ActionHandle,
+    pub(in crate::run) step: StepId,
     action: Arc<Action>,
-    pub(super) start: Rational,
-    pub(super) duration: Option<Rational>,
+    pub(in crate::run) start: Rational,
+    pub(in crate::run) duration: Option<Rational>,
 }
 
 impl ExpectedStart {
-    pub(super) fn as_step(&self, duration: Option<Rational>) -> Step {
+    pub(in crate::run) fn as_step(&self, duration: Option<Rational>) -> Step {
         Step {
             action: Arc::clone(&self.action),
             start: self.start.clone(),
@@ -42,33 +42,33 @@ impl ExpectedStart {
 
 /// Initial situation of a new plan.
 #[derive(Clone, Debug)]
-pub(super) struct PredictedState {
-    pub(super) situation: Situation,
+pub(in crate::run) struct PredictedState {
+    pub(in crate::run) situation: Situation,
     /// The actions running there. Tickets that have not been issued yet are those of expected
     /// starts.
-    pub(super) running: Vec<ActionHandle>,
+    pub(in crate::run) running: Vec<ActionHandle>,
     /// The expected starts until then.
-    pub(super) expected: Vec<ExpectedStart>,
+    pub(in crate::run) expected: Vec<ExpectedStart>,
 }
 
 /// The range of a forecast.
-pub(super) struct PredictionHorizon {
+pub(in crate::run) struct PredictionHorizon {
     /// The time of the forecast.
-    pub(super) time: Rational,
+    pub(in crate::run) time: Rational,
     /// Steps that would start at this time or later are not expected to start.
-    pub(super) starts_before: Rational,
+    pub(in crate::run) starts_before: Rational,
     /// Actions that would end later than this are not expected to have ended.
-    pub(super) ends_by: Rational,
+    pub(in crate::run) ends_by: Rational,
     /// The assumption about overdue actions.
-    pub(super) late_actions: LateActionAssumption,
+    pub(in crate::run) late_actions: LateActionAssumption,
 }
 
 /// Assumption about a running action that should have ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum LateActionAssumption {
+pub(in crate::run) enum LateActionAssumption {
     /// It takes a quarter longer than it has taken so far.
     QuarterLonger,
-    /// It does not end. Only an action that is late by no more than [`Run::slack`] and has no
+    /// It does not end. Only an action that is late by no more than [`punctuality_tolerance`] and has no
     /// warning ends now.
     Continues,
 }
@@ -84,21 +84,21 @@ struct ForecastState {
     expected: Vec<ExpectedStart>,
 }
 
-impl Run<'_> {
-    /// Returns the delay that still counts as punctual, in seconds. On a real clock, no event is
-    /// punctual to the millisecond.
-    pub(super) fn punctuality_tolerance() -> Rational {
-        Rational::new(1, 4)
-    }
+/// Returns the delay that still counts as punctual, in seconds. On a real clock, no event is
+/// punctual to the millisecond.
+pub(in crate::run) fn punctuality_tolerance() -> Rational {
+    Rational::new(1, 4)
+}
 
+impl RunView<'_> {
     /// Returns the expected situation when planning ends, or at `until`, if the present plan
     /// continues.
-    pub(super) fn expected_situation_after_planning(
+    pub(in crate::run) fn expected_situation_after_planning(
         &self,
         until: Option<&Rational>,
     ) -> PredictedState {
         let epsilon = self.task.epsilon();
-        let expected_to_be_over = &self.now + &self.expected_planning_time + epsilon;
+        let expected_to_be_over = self.now + self.expected_planning_time + epsilon;
         let time = until.cloned().unwrap_or(expected_to_be_over);
         let before = &time - epsilon;
         self.expected_situation(&PredictionHorizon {
@@ -110,7 +110,7 @@ impl Run<'_> {
     }
 
     /// Returns the expected situation if the present plan continues.
-    pub(super) fn expected_situation(&self, reach: &PredictionHorizon) -> PredictedState {
+    pub(in crate::run) fn expected_situation(&self, reach: &PredictionHorizon) -> PredictedState {
         let mut future = self.initial_forecast(reach);
         while self.execute_next_event(&mut future, reach) {}
         let time = reach.time.clone();
@@ -136,26 +136,26 @@ impl Run<'_> {
 
     fn initial_forecast(&self, reach: &PredictionHorizon) -> ForecastState {
         let mut belief = self.belief.clone();
-        let _ = belief.advance(&self.now);
+        let _ = belief.advance(self.now);
         let mut ends = Vec::new();
         for (ticket, underway) in self.belief.running() {
             if let Some(end) = self.expected_end(*ticket, underway, reach.late_actions) {
-                let entry = self.action_log.get(*ticket);
+                let entry = self.log.get(*ticket);
                 ends.push((end, *ticket, entry.and_then(|entry| entry.step)));
             }
         }
         // Commanded actions whose start was not reported are assumed to start now.
-        for ticket in self.action_log.open_tickets() {
-            let entry = self.action_log.get(ticket);
+        for ticket in self.log.open_tickets() {
+            let entry = self.log.get(ticket);
             let Some(entry) = entry.filter(|entry| entry.started.is_none()) else {
                 continue;
             };
             let duration = entry.planned.clone().unwrap_or_default();
             if let Some(begun) =
-                belief_after_start(&belief, ticket, &entry.action, &self.now, &duration)
+                belief_after_start(&belief, ticket, &entry.action, self.now, &duration)
             {
                 belief = begun;
-                ends.push((&self.now + duration, ticket, entry.step));
+                ends.push((self.now + duration, ticket, entry.step));
             }
         }
         ForecastState {
@@ -169,7 +169,7 @@ impl Run<'_> {
 
     /// Returns `true` if it should have ended.
     fn is_due(&self, underway: &RunningActionState) -> bool {
-        &underway.start + &underway.planned <= self.now
+        &underway.start + &underway.planned <= *self.now
     }
 
     /// Returns the expected end of a running action; `None` if it is not expected to end.
@@ -183,15 +183,15 @@ impl Run<'_> {
         if !self.is_due(underway) {
             return Some(planned);
         }
-        let soonest = &self.now + self.task.epsilon();
+        let soonest = self.now + self.task.epsilon();
         match late {
             LateActionAssumption::QuarterLonger => {
-                Some(quarter_longer_end(&self.belief, ticket, &self.now).max(soonest))
+                Some(quarter_longer_end(self.belief, ticket, self.now).max(soonest))
             }
             LateActionAssumption::Continues => {
-                let entry = self.action_log.get(ticket);
+                let entry = self.log.get(ticket);
                 let was_warned_of = entry.is_some_and(|entry| entry.warned.is_some());
-                let is_on_time = planned + Self::punctuality_tolerance() >= self.now;
+                let is_on_time = planned + punctuality_tolerance() >= *self.now;
                 (is_on_time && !was_warned_of).then_some(soonest)
             }
         }
@@ -201,15 +201,15 @@ impl Run<'_> {
     /// with their earliest times. Their tickets are not chosen yet.
     fn upcoming_steps(&self, before: &Rational) -> Vec<ExpectedStart> {
         // These executors choose their own step numbers.
-        if self.ports.executor.need() == PlanForm::PartialOrder {
+        if self.executor.need() == PlanForm::PartialOrder {
             return Vec::new();
         }
-        let steps = self.action_log.plan_steps().iter();
-        let left = steps
-            .filter(|(id, step)| step.start < *before && self.action_log.ticket(*id).is_none());
-        let soonest = &self.now + self.task.epsilon();
+        let steps = self.log.plan_steps().iter();
+        let left =
+            steps.filter(|(id, step)| step.start < *before && self.log.ticket(*id).is_none());
+        let soonest = self.now + self.task.epsilon();
         let left = left.map(|(id, step)| {
-            let window = self.ports.executor.window(*id, false);
+            let window = self.executor.window(*id, false);
             let earliest = window.and_then(|window| window.earliest);
             let start = step.start.clone().max(soonest.clone());
             ExpectedStart {
@@ -229,9 +229,9 @@ impl Run<'_> {
     /// Returns the earliest start of a step, if all its predecessors have happened.
     fn start_in(&self, future: &ForecastState, it: &ExpectedStart) -> Option<Rational> {
         let mut start = it.start.clone().max(future.belief.time().clone());
-        for wait in self.action_log.waits(it.step) {
+        for wait in self.log.waits(it.step) {
             let expected = future.times.get(&wait.event);
-            let happened = expected.or_else(|| self.action_log.time_of(wait.event))?;
+            let happened = expected.or_else(|| self.log.time_of(wait.event))?;
             start = start.max(happened + &wait.min_delay);
         }
         Some(start)
@@ -267,7 +267,7 @@ impl Run<'_> {
         };
         let now = starts.iter().filter(|(start, _)| *start == time);
         let now: Vec<usize> = now.map(|(_, index)| *index).collect();
-        let ticket = ActionHandle(self.action_log.started() as u64 + future.expected.len() as u64);
+        let ticket = ActionHandle(self.log.started() as u64 + future.expected.len() as u64);
         for index in &now {
             let it = &future.to_come[*index];
             let duration = it.duration.clone().unwrap_or_default();
