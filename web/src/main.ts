@@ -291,9 +291,9 @@ async function begin(): Promise<void> {
   try {
     engine = await Engine.load(by("module").textContent ?? "");
     const about = await ask({ ask: "about" });
-    const executors = (about?.answer as unknown as { executors: { example: string; summary: string }[] } | undefined)?.executors ?? [];
-    const wanted = choices.executor.value || "live";
-    choices.executor.replaceChildren(...executors.map(({ example, summary }) => {
+    const known = about?.answer as unknown as { default_executor: string; executors: { example: string; summary: string }[] } | undefined;
+    const wanted = choices.executor.value || known?.default_executor;
+    choices.executor.replaceChildren(...(known?.executors ?? []).map(({ example, summary }) => {
       const option = new Option(example, example, false, example === wanted);
       option.title = summary;
       return option;

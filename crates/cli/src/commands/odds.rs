@@ -99,16 +99,6 @@ fn settings(arguments: &OddsArgs) -> Result<OddsSettings, Failure> {
                 Failure::new(error, "`elbowroom run --help` describes them all")
             },
         )?;
-        if let Some(odd) = settings
-            .executors
-            .iter()
-            .find(|spec| spec.needs_comparator())
-        {
-            return Err(Failure::new(
-                format!("`{odd}` compares plans during execution, which `odds` does not sample"),
-                "leave out the number in its name, or use `elbowroom compare`",
-            ));
-        }
     }
     Ok(settings)
 }

@@ -19,6 +19,7 @@ use std::process::Command;
 use toml::{Table, Value};
 
 mod documents;
+mod executor_names;
 mod modules;
 mod wording;
 

@@ -29,7 +29,7 @@ pub enum PlanObjective {
     /// Documents in JSON call it `room`.
     #[serde(rename = "room", alias = "slack")]
     Slack,
-    /// The success probability in a world, with the executor `live` and without replanning.
+    /// The success probability in a world, with the default executor and without replanning.
     Probability,
 }
 
