@@ -399,12 +399,16 @@ fn about() -> Result<Reply, Failure> {
             "summary": executor.summary,
         })
     });
+    let guarantees = Guarantee::TERMS.iter();
+    let guarantees = guarantees.map(|(_, name, meaning)| json!({"name": name, "meaning": meaning}));
     let about = json!({
         "format": "elbowroom-about",
         "version": 1,
         "elbowroom": env!("CARGO_PKG_VERSION"),
         "default_executor": DEFAULT_EXECUTOR,
         "executors": executors.collect::<Vec<_>>(),
+        "default_guarantee": Guarantee::default(),
+        "guarantees": guarantees.collect::<Vec<_>>(),
     });
     Ok(Reply {
         exit: YES,

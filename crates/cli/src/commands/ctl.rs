@@ -5,6 +5,7 @@ use std::io::{self, ErrorKind};
 use std::time::Duration;
 
 use elbowroom::answers::exact::{INFINITY, MINUS_INFINITY};
+use elbowroom::execution::GuaranteeLevel;
 use elbowroom::num::work::Stop;
 use elbowroom::num::{End, Rational};
 use elbowroom::report::exact::Exact;
@@ -447,19 +448,15 @@ fn plan(plan: &PlanNow) -> String {
 }
 
 fn guarantee(guarantee: &GuaranteeNow) -> String {
-    let (name, condition) = match guarantee.promise.as_deref() {
-        Some("envelope") => ("envelope", Some("each quantity stays inside its interval")),
-        Some("part-of-envelope") => (
-            "part-of-envelope",
-            Some("each quantity stays inside a part of its interval"),
-        ),
-        Some("planned") => (
-            "none, feasible at nominal durations",
-            Some("each action still to start takes as long as planned"),
-        ),
-        Some(_) => ("none, may still work", None),
-        None => ("none", None),
+    let promise = guarantee.promise.as_deref();
+    let mut known = GuaranteeLevel::TERMS.iter();
+    let level = known.find(|(_, name, _)| Some(*name) == promise);
+    let name = match level {
+        Some((level, ..)) => level.label(),
+        None if promise.is_some() => GuaranteeLevel::Luck.label(),
+        None => "none",
     };
+    let condition = level.and_then(|(level, ..)| level.condition());
     let mut text = format!("guarantee: {name}");
     if let Some(since) = &guarantee.since {
         let _ = write!(text, ", since {}", nearest(&since.0));

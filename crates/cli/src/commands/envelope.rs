@@ -41,9 +41,7 @@ pub(crate) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
     let request = EnvelopeRequest {
         name: arguments.plan.display().to_string(),
         vary,
-        guarantee: arguments
-            .guarantee
-            .map_or_else(Default::default, Into::into),
+        guarantee: arguments.guarantee.unwrap_or_default(),
         enforce: arguments.enforce,
         timeout: arguments.timeout.clone().unwrap_or_default(),
         contains: arguments.contains.clone(),

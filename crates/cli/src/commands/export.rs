@@ -158,7 +158,7 @@ fn requested_box(
     plan: &ParametrizedPlan,
     task: &Task,
 ) -> Result<Option<(DecoupledEnvelope, Guarantee)>, Failure> {
-    let guarantee: Option<Guarantee> = arguments.guarantee.map(Into::into);
+    let guarantee: Option<Guarantee> = arguments.guarantee;
     if let Some(text) = &arguments.contains {
         let envelope = parse_box(text, plan);
         let envelope =

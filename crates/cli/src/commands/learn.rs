@@ -101,7 +101,7 @@ fn conformal_request(
     Ok(Some(ConformalRequest {
         task,
         plan,
-        guarantee: arguments.guarantee.into(),
+        guarantee: arguments.guarantee,
         probability: probability.to_f64(),
     }))
 }

@@ -21,6 +21,7 @@ use toml::{Table, Value};
 mod documents;
 mod executor_names;
 mod modules;
+mod terms;
 mod wording;
 
 /// Crates by folder, lowest first, with their permitted dependencies.

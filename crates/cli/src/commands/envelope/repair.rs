@@ -44,9 +44,7 @@ pub(super) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
         name: arguments.plan.display().to_string(),
         change: read("--change", &arguments.change)?,
         keep: read("--keep", &arguments.keep)?,
-        guarantee: arguments
-            .guarantee
-            .map_or_else(Default::default, Into::into),
+        guarantee: arguments.guarantee.unwrap_or_default(),
         ..RepairRequest::new(
             &Arc::new(task.clone()),
             input::any_plan(&task, &arguments.plan, &arguments.rounding(), output)?,
