@@ -23,8 +23,8 @@ use crate::args::{CtlArgs, CtlCommand};
 use crate::exit::{Answer, Exit, Failure};
 use crate::number::nearest;
 use crate::output::{self, Output};
-use crate::terminal::{EMPHASIS, TextLayout, styled};
-use crate::wrap::wrap;
+use crate::terminal::{EMPHASIS, stdout_layout, styled};
+use elbowroom::report::console::wrap;
 
 /// Sends the request and prints the answer.
 pub(crate) fn run(arguments: &CtlArgs, output: &mut Output) -> Answer {
@@ -336,7 +336,7 @@ fn goals(goals: &GoalsNow) -> String {
         if let Some(why) = &goal.why {
             let _ = write!(line, "; {}", escape_control(why));
         }
-        let _ = writeln!(text, "{}", wrap(&line, TextLayout::of_stdout().width, 2));
+        let _ = writeln!(text, "{}", wrap(&line, stdout_layout().width, 2));
     }
     if text.is_empty() {
         text.push_str("there is no goal\n");
@@ -357,14 +357,14 @@ fn state(state: &State) -> String {
     text.push('\n');
     if let Some(why) = &state.restarting {
         let why = format!("world restarting: {}", escape_control(why));
-        let _ = writeln!(text, "{}", wrap(&why, TextLayout::of_stdout().width, 2));
+        let _ = writeln!(text, "{}", wrap(&why, stdout_layout().width, 2));
     }
     if let Some(seconds) = state.unanswered {
         let why = format!(
             "the world has not answered for {seconds} s: until it does, no action is started and \
              no request is processed"
         );
-        let _ = writeln!(text, "{}", wrap(&why, TextLayout::of_stdout().width, 2));
+        let _ = writeln!(text, "{}", wrap(&why, stdout_layout().width, 2));
     }
     for goal in &state.goals {
         let (name, pddl) = (escape_control(&goal.name), escape_control(&goal.goal));
@@ -413,7 +413,7 @@ fn state(state: &State) -> String {
             "{name} is in doubt since {since}: {}",
             escape_control(&doubt.why)
         );
-        let _ = writeln!(text, "{}", wrap(&line, TextLayout::of_stdout().width, 2));
+        let _ = writeln!(text, "{}", wrap(&line, stdout_layout().width, 2));
     }
     let _ = writeln!(text, "  {}", count_with_noun(state.facts.len(), "fact"));
     for fact in &state.facts {

@@ -18,10 +18,10 @@ use elbowroom_export::{self as export, ExportError};
 use crate::args::{self, ExportArgs, ExportFormat};
 use crate::commands::envelope::specifications;
 use crate::exit::{Answer, Exit, Failure};
-use crate::limits::push_wrapped;
 use crate::output::Output;
 use crate::terminal::{ERROR, HINT, TextLayout, styled};
 use crate::{input, output};
+use elbowroom::report::console::push_wrapped;
 
 /// Writes a network, a box check or a region.
 pub(crate) fn run(arguments: &ExportArgs, output: &mut Output) -> Answer {

@@ -1,7 +1,5 @@
 //! `elbowroom odds`: success probability of a plan.
 
-mod text;
-
 use std::sync::Arc;
 
 use elbowroom::RoundingRule;
@@ -13,7 +11,7 @@ use crate::exit::{Answer, Exit, Failure};
 use crate::input;
 use crate::interrupt::Interrupt;
 use crate::output::{self, Output};
-use crate::terminal::TextLayout;
+use crate::terminal::stdout_layout;
 use crate::time_limit::Stopwatch;
 
 /// Computes the success probability of a plan.
@@ -64,7 +62,7 @@ pub(crate) fn run(arguments: &OddsArgs, output: &mut Output) -> Answer {
     if arguments.json {
         output.document(&answer)?;
     } else {
-        let text = text::render(&answer, arguments.layers, TextLayout::of_stdout());
+        let text = answer.text(arguments.layers, stdout_layout());
         output::print(&text)?;
     }
     written?;

@@ -24,7 +24,7 @@ use crate::args::{EMBEDDED, PlanArgs};
 use crate::exit::{Answer, Exit, Failure};
 use crate::input::ReadProblem;
 use crate::output::Output;
-use crate::terminal::TextLayout;
+use crate::terminal::stdout_layout;
 use crate::{input, output};
 use monitor::PlanMonitor;
 
@@ -198,7 +198,7 @@ fn print(
     } else if let (Some(plan), None) = (&plan, &arguments.output) {
         output::print(plan)?;
     }
-    let certified = text::certificate_text(answer, TextLayout::of_stdout());
+    let certified = text::certificate_text(answer, stdout_layout());
     if let Some(line) = certified.filter(|_| !arguments.json) {
         output::print_to_stderr(&line);
     }

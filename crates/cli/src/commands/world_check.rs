@@ -14,8 +14,8 @@ use crate::args::{ProblemArgs, WorldCheckArgs};
 use crate::exit::{Answer, Exit, Failure};
 use crate::input;
 use crate::output::{self, Output};
-use crate::terminal::{ERROR, HINT, SUCCESS, TextLayout, styled};
-use crate::wrap::wrap;
+use crate::terminal::{ERROR, HINT, SUCCESS, stdout_layout, styled};
+use elbowroom::report::console::wrap;
 use elbowroom_executive::messages::escape_control;
 use elbowroom_executive::world_check::{Outcome, Row, check_world};
 use elbowroom_executive::world_protocol::Greeting;
@@ -92,7 +92,7 @@ fn script(
 }
 
 fn text(rows: &[Row], greeting: Option<&Greeting>, conforms: bool) -> String {
-    let width = TextLayout::of_stdout().width;
+    let width = stdout_layout().width;
     let mut text = match greeting {
         Some(greeting) => {
             let name = match greeting.name.as_str() {

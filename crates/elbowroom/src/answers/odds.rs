@@ -4,6 +4,7 @@ mod executed;
 mod improvements;
 mod lattice;
 mod order;
+mod text;
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
