@@ -291,11 +291,16 @@ async function begin(): Promise<void> {
   try {
     engine = await Engine.load(by("module").textContent ?? "");
     const about = await ask({ ask: "about" });
-    const executors = (about?.answer as unknown as { executors: { example: string; summary: string }[] } | undefined)?.executors ?? [];
-    const wanted = choices.executor.value || "live";
-    choices.executor.replaceChildren(...executors.map(({ example, summary }) => {
+    const known = about?.answer as unknown as { default_executor: string; executors: { example: string; summary: string }[]; default_guarantee: string; guarantees: { name: string; meaning: string }[] } | undefined;
+    const wanted = choices.executor.value || known?.default_executor;
+    choices.executor.replaceChildren(...(known?.executors ?? []).map(({ example, summary }) => {
       const option = new Option(example, example, false, example === wanted);
       option.title = summary;
+      return option;
+    }));
+    choices.guarantee.replaceChildren(...(known?.guarantees ?? []).map(({ name, meaning }) => {
+      const option = new Option(name, name, false, name === known?.default_guarantee);
+      option.title = meaning;
       return option;
     }));
     if (isShared) await restore();

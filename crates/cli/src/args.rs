@@ -11,6 +11,7 @@ mod odds;
 mod plan;
 mod run;
 mod serve;
+mod term;
 mod world_check;
 
 use std::ffi::OsString;
@@ -28,7 +29,7 @@ pub(crate) use learn::LearnArgs;
 pub(crate) use network::{DurationsChoice, NetworkArgs};
 use number::{positive, positive_or_zero};
 pub(crate) use odds::OddsArgs;
-pub(crate) use plan::{EMBEDDED, PlanArgs, PlanObjectiveChoice};
+pub(crate) use plan::{EMBEDDED, PlanArgs};
 pub(crate) use run::{FirstPlanChoice, RunArgs, RunningChoice};
 pub(crate) use serve::{CtlArgs, CtlCommand, ServeArgs};
 pub(crate) use world_check::WorldCheckArgs;

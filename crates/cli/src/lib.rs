@@ -17,10 +17,8 @@ mod number;
 mod output;
 mod panic_hook;
 mod progress;
-mod table;
 mod terminal;
 mod time_limit;
-mod wrap;
 
 use std::ffi::OsString;
 

@@ -7,7 +7,7 @@
 //! ```
 
 use elbowroom::answers::envelope::LimitGroup;
-use unicode_width::UnicodeWidthStr;
+use elbowroom::report::console::push_wrapped;
 
 use crate::terminal::{EMPHASIS, SECONDARY, TextLayout, styled};
 
@@ -37,38 +37,6 @@ pub(crate) fn render(limits: &[LimitGroup], look: TextLayout) -> String {
         }
     }
     text
-}
-
-/// Appends the words of `words` as a list item: in lines of at most `width` columns, the first
-/// indented by `indent`, the others by two more.
-pub(crate) fn push_wrapped(text: &mut String, words: &str, indent: usize, width: usize) {
-    push_lines(text, words, [indent, indent + 2], width);
-}
-
-/// Appends the words of `words` as a paragraph, in lines of at most `width` columns.
-pub(crate) fn push_paragraph(text: &mut String, words: &str, width: usize) {
-    push_lines(text, words, [0, 0], width);
-}
-
-fn push_lines(text: &mut String, words: &str, [indent, hanging]: [usize; 2], width: usize) {
-    let mut line = " ".repeat(indent);
-    let mut is_empty = true;
-    for word in words.split_whitespace() {
-        let needed = line.width() + usize::from(!is_empty) + word.width();
-        if !is_empty && needed > width {
-            text.push_str(&line);
-            text.push('\n');
-            line = " ".repeat(hanging);
-            is_empty = true;
-        }
-        if !is_empty {
-            line.push(' ');
-        }
-        line.push_str(word);
-        is_empty = false;
-    }
-    text.push_str(&line);
-    text.push('\n');
 }
 
 #[cfg(test)]

@@ -1,3 +1,3 @@
 //! Formatting of exact numbers.
 
-pub(crate) use elbowroom::report::decimal::{Rounding, nearest, rounded, rounded_inwards};
+pub(crate) use elbowroom::report::decimal::{Rounding, nearest, rounded};

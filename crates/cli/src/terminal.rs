@@ -3,39 +3,22 @@
 use std::env;
 use std::io::{self, IsTerminal};
 
-use anstyle::{AnsiColor, Style};
+pub(crate) use elbowroom::report::console::{
+    EMPHASIS, ERROR, HINT, SECONDARY, SUCCESS, TextLayout, WARNING, styled,
+};
 
-/// Width assumed without a terminal.
-const DEFAULT_WIDTH: usize = 80;
 /// Maximum width; longer lines are hard to read.
 const MAX_WIDTH: usize = 110;
 
-/// Layout of text: width and character set.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct TextLayout {
-    /// Maximum number of columns.
-    pub(crate) width: usize,
-    /// `true` if characters beyond ASCII may be used.
-    pub(crate) unicode: bool,
-}
-
-impl TextLayout {
-    /// Layout of plain text, for pipes and files.
-    pub(crate) const PLAIN: Self = Self {
-        width: DEFAULT_WIDTH,
-        unicode: false,
-    };
-
-    /// Returns the layout for standard output.
-    pub(crate) fn of_stdout() -> Self {
-        if !io::stdout().is_terminal() {
-            return Self::PLAIN;
-        }
-        let width = columns().unwrap_or(DEFAULT_WIDTH);
-        Self {
-            width: width.clamp(40, MAX_WIDTH),
-            unicode: locale_is_utf8(),
-        }
+/// Returns the layout for standard output.
+pub(crate) fn stdout_layout() -> TextLayout {
+    if !io::stdout().is_terminal() {
+        return TextLayout::PLAIN;
+    }
+    let width = columns().unwrap_or(TextLayout::PLAIN.width);
+    TextLayout {
+        width: width.clamp(40, MAX_WIDTH),
+        unicode: locale_is_utf8(),
     }
 }
 
@@ -69,26 +52,4 @@ fn locale_is_utf8() -> bool {
         }
         None => cfg!(windows),
     }
-}
-
-/// Style of headings and results.
-pub(crate) const EMPHASIS: Style = Style::new().bold();
-/// Style of secondary information.
-pub(crate) const SECONDARY: Style = Style::new().dimmed();
-/// Style of success.
-pub(crate) const SUCCESS: Style = AnsiColor::Green.on_default().bold();
-/// Style of errors.
-pub(crate) const ERROR: Style = AnsiColor::Red.on_default().bold();
-/// Style of warnings.
-pub(crate) const WARNING: Style = AnsiColor::Yellow.on_default().bold();
-/// Style of advice.
-pub(crate) const HINT: Style = AnsiColor::Cyan.on_default().bold();
-
-/// Returns the text with escape sequences for a style. They are removed if the output does not
-/// support colours.
-pub(crate) fn styled(style: Style, text: &str) -> String {
-    if text.is_empty() {
-        return String::new();
-    }
-    format!("{style}{text}{style:#}")
 }

@@ -12,8 +12,8 @@ pub use elbowroom_selection::{
     MostProbablePlanner, PLANNING_BUDGET, Pace, PlanPreparer, PlanSelector, Replanning,
     RolloutPolicy, RolloutSession, Rollouts, RunRollouts, SelectingPlanner,
     SharedMostProbablePlanner, SharedRolloutPolicy, UnknownFirstPlan, Validated, Value,
-    WorldKnowledge, check_vary, execute, ill_typed_part, obstacle_to_deadline, planning_work,
-    read_goal, rewrite,
+    WorldKnowledge, action_values, check_vary, execute, ill_typed_part, obstacle_to_deadline,
+    planning_work, read_goal, rewrite,
 };
 pub use spec::{
     AdversaryError, AdversarySettings, EMBEDDED, FirstPlanError, MOST_STATES, NO_PLANNER,

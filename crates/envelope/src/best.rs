@@ -30,7 +30,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use elbowroom_num::log_concave::LogConcaveDistribution;
-use elbowroom_num::{Interval, Rational};
+use elbowroom_num::{Interval, Rational, terms};
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, ParametrizedPlan, Side};
 use serde::{Deserialize, Serialize};
 
@@ -48,44 +48,32 @@ use volume::Volume;
 pub use elbowroom_num::log_concave::TangentPoint;
 pub use volume::width_offset as volume_foot;
 
-/// The objective of a largest box.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
-)]
-#[serde(rename_all = "kebab-case")]
-#[non_exhaustive]
-pub enum Objective {
-    /// The least slack of any end (its deviation relative to the nominal value); of the boxes with
-    /// the greatest least slack, the second least slack, and so on.
-    #[default]
-    LeastSlack,
-    /// The sum of the widths of all intervals, each times its parameter's weight.
-    Widths,
-    /// The product of the widths of all intervals, each relative to its nominal value and raised to
-    /// its parameter's weight. A millionth is added to each width first, so that the product is not
-    /// 0 if one duration cannot deviate at all. The value is the logarithm of the product. A box
-    /// counts as best if no other is better by more than a millionth.
-    Volume,
-    /// The probability that independent durations, each with its distribution
-    /// ([`BestSettings::distributions`]), all stay inside. The value is the logarithm; [`LOG_OF_ZERO`] replaces
-    /// the logarithm of 0. A box counts as best if no other is better by more than a millionth.
-    Probability,
+terms! {
+    /// The objective of a largest box.
+    ///
+    /// For the volume, a millionth is added to each width first, relative to its nominal value, so that the product is
+    /// not 0 if one duration cannot deviate at all. The value of the volume and of the probability is the logarithm;
+    /// [`LOG_OF_ZERO`] replaces the logarithm of 0. A box counts as best for them if no other is better by more than a
+    /// millionth.
+    #[derive(
+        Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
+    )]
+    #[serde(rename_all = "kebab-case")]
+    #[non_exhaustive]
+    pub enum Objective {
+        #[default]
+        LeastSlack = "least-slack":
+            "The least slack of any bound, relative to the nominal value; then the second least, and so on",
+        Widths = "widths": "The sum of the widths of all intervals, times the weights of --vary",
+        Volume = "volume":
+            "The product of the widths of all intervals, with the weights of --vary as exponents",
+        Probability = "probability":
+            "The probability that independent durations, distributed as in the world file of --world, all stay inside",
+    }
 }
 
 /// Value of a box with probability 0, in place of the logarithm.
 pub const LOG_OF_ZERO: i64 = -1_000_000;
-
-impl Objective {
-    /// Returns its name in documents and on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::LeastSlack => "least-slack",
-            Self::Widths => "widths",
-            Self::Volume => "volume",
-            Self::Probability => "probability",
-        }
-    }
-}
 
 impl fmt::Display for Objective {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

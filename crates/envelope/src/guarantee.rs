@@ -3,7 +3,7 @@
 use std::fmt;
 use std::sync::{Arc, OnceLock};
 
-use elbowroom_num::Rational;
+use elbowroom_num::{Rational, terms};
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan};
 use elbowroom_stn::corner_search::TooManyBranches;
 
@@ -20,39 +20,29 @@ use crate::reduction::Reduction;
 /// cost more than the time saved.
 const MAX_CACHED_PARAMETERS: usize = 10_000;
 
-/// Guarantee that holds inside an envelope.
-///
-/// With each of them, every schedule that the plan's network allows is valid. They differ in what
-/// the executor has to know about the parameters to find such a schedule.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
-)]
-#[serde(rename_all = "lowercase")]
-#[non_exhaustive]
-pub enum Guarantee {
-    /// There is a schedule for all values, for an executor that knows them in advance (weak
-    /// controllability). The papers compute this guarantee.
-    Weak,
-    /// The plan can be executed by an executor that observes each value only when it is realised
-    /// (dynamic controllability).
-    #[default]
-    Dynamic,
-    /// One schedule works for all values (strong controllability).
-    Strong,
+terms! {
+    /// Guarantee that holds inside an envelope.
+    ///
+    /// With each of them, every schedule that the plan's network allows is valid. They differ in what
+    /// the executor has to know about the parameters to find such a schedule. The papers compute the weak one.
+    #[derive(
+        Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
+    )]
+    #[serde(rename_all = "lowercase")]
+    #[non_exhaustive]
+    pub enum Guarantee {
+        Weak = "weak":
+            "Weak controllability: a schedule exists for all values, if they are known in advance",
+        #[default]
+        Dynamic = "dynamic":
+            "Dynamic controllability: an executor that observes each value only when it occurs succeeds",
+        Strong = "strong": "Strong controllability: one fixed schedule works for all values",
+    }
 }
 
 impl Guarantee {
     /// All guarantees, the weakest first.
     pub const ALL: [Self; 3] = [Self::Weak, Self::Dynamic, Self::Strong];
-
-    /// Returns its name in documents and on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Weak => "weak",
-            Self::Dynamic => "dynamic",
-            Self::Strong => "strong",
-        }
-    }
 }
 
 impl fmt::Display for Guarantee {

@@ -62,10 +62,86 @@ pub struct ExecutorEntry {
     pub summary: &'static str,
     /// The paper on which it is based.
     pub paper: &'static str,
-    /// The form of a plan that it requires.
-    pub need: PlanForm,
+    /// The services that it uses.
+    pub needs: Needs,
+    /// The roles in which other components use it.
+    pub roles: &'static [Role],
     /// Constructor.
     make: fn(Option<Rational>, ExecutorServices) -> Box<dyn Executor>,
+}
+
+/// The services that an executor uses. It receives only these ([`ExecutorServices`]). Without a service that is not
+/// available, it executes its plan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Needs {
+    /// The form of a plan that it requires.
+    pub plan: PlanForm,
+    /// The comparison of the remaining plan with other plans ([`PlanComparator`]).
+    pub odds: Need,
+    /// The values of all moves ([`ActionValues`]).
+    pub action_values: bool,
+    /// The simulation of possible moves ([`RolloutEvaluator`]), if there are no action values.
+    pub rollouts: bool,
+    /// The most likely order of the plan's actions. First plans are then compared in that order.
+    pub orders: bool,
+}
+
+/// Condition under which an executor uses a service.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Need {
+    /// It does not use the service.
+    Never,
+    /// It uses the service if it has an argument, and cannot be run with an argument without it.
+    WithArgument,
+    /// It uses the service if it is available.
+    Always,
+}
+
+/// A role in which other components use executors, without an argument.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// Rollouts consider it for a new plan. Its preparation may take long.
+    FirstPlan,
+    /// Rollouts consider it for the remaining plan. Its preparation is fast.
+    RemainingPlan,
+    /// Executes plans that are evaluated in samples: new plans in rollouts, and plans in `odds`.
+    Evaluation,
+    /// Replans at the first deviation, so that samples show many new plans.
+    EarlyReplanning,
+}
+
+impl Role {
+    /// All roles, with their names in documents.
+    pub const NAMES: &[(Self, &str)] = &[
+        (Self::FirstPlan, "first plan"),
+        (Self::RemainingPlan, "remaining plan"),
+        (Self::Evaluation, "evaluation"),
+        (Self::EarlyReplanning, "early replanning"),
+    ];
+}
+
+impl Needs {
+    /// Creates the needs of an executor that uses only a plan of this form.
+    pub const fn plan(plan: PlanForm) -> Self {
+        Self {
+            plan,
+            odds: Need::Never,
+            action_values: false,
+            rollouts: false,
+            orders: false,
+        }
+    }
+}
+
+/// Returns the executors with a role, in the order of the registry.
+pub fn with_role(role: Role) -> impl DoubleEndedIterator<Item = ExecutorSpec> {
+    let registered = EXECUTORS
+        .iter()
+        .filter(move |entry| entry.roles.contains(&role));
+    registered.map(|registered| ExecutorSpec {
+        registered,
+        argument: None,
+    })
 }
 
 /// The services that an executor may use while it executes a plan.
@@ -74,18 +150,15 @@ pub struct ExecutorServices {
     pub region: Box<dyn RegionOracle>,
     /// The likelihoods of failures and spontaneous changes.
     pub likelihoods: Arc<Likelihoods>,
-    /// For executors that search for more likely plans ([`ExecutorSpec::needs_comparator`]). Without it,
-    /// they do not search.
+    /// Comparison with other plans: [`Needs::odds`].
     pub comparator: Option<Box<dyn PlanComparator>>,
-    /// For `lookahead`: results for the same problem and likelihoods from other runs.
+    /// Cache of policy tables: results for the same problem and likelihoods from other runs.
     pub policy_cache: PolicyTableCache,
-    /// For `adaptable`: results for the same plans from other samples of the same scene.
+    /// Cache of orders: results for the same plans from other samples of the same scene.
     pub order_cache: Option<OrderCache>,
-    /// For executors that evaluate each move ([`ExecutorSpec::needs_action_values`]). Without it, they
-    /// follow their plan.
+    /// Values of all moves: [`Needs::action_values`].
     pub action_values: Option<Arc<dyn ActionValues>>,
-    /// For executors that evaluate each move, if there is no [`ActionValues`]: simulates the possible
-    /// moves.
+    /// Simulation of possible moves, if there are no action values: [`Needs::rollouts`].
     pub rollout: Option<Box<dyn RolloutEvaluator>>,
 }
 
@@ -151,19 +224,28 @@ impl ExecutorSpec {
         (self.registered.make)(self.argument.clone(), means.into())
     }
 
+    /// Returns the services that the executor uses.
+    pub fn needs(&self) -> &'static Needs {
+        &self.registered.needs
+    }
+
     /// Returns `true` if the executor searches for plans that are more likely to succeed.
-    pub fn needs_comparator(&self) -> bool {
-        self.needs_action_values() || (self.registered.is_optional && self.argument.is_some())
+    pub fn needs_odds(&self) -> bool {
+        match self.needs().odds {
+            Need::Never => false,
+            Need::WithArgument => self.argument.is_some(),
+            Need::Always => true,
+        }
     }
 
-    /// Returns `true` if the executor chooses the most likely order of a plan's actions.
-    pub fn chooses_order(&self) -> bool {
-        [adaptable::REGISTERED.name, lookahead::REGISTERED.name].contains(&self.registered.name)
+    /// Returns `true` if the executor uses a service that is computed from a model of the world.
+    pub fn uses_world_model(&self) -> bool {
+        self.needs_odds() || self.needs().action_values || self.needs().rollouts
     }
 
-    /// Returns `true` if the executor evaluates each move with an [`ActionValues`], where there is one.
-    pub fn needs_action_values(&self) -> bool {
-        self.registered.name == policy::REGISTERED.name
+    /// Returns `true` if the executor cannot be run without a model of the world.
+    pub fn requires_world_model(&self) -> bool {
+        self.needs().odds == Need::WithArgument && self.argument.is_some()
     }
 }
 

@@ -5,7 +5,7 @@ mod subject;
 
 use std::fmt;
 
-use elbowroom_num::{Interval, Rational};
+use elbowroom_num::{Interval, Rational, terms};
 
 pub use evidence::{Evidence, TimedChange};
 pub use subject::Subject;
@@ -35,117 +35,65 @@ pub struct Reason {
     pub guarantee: Option<GuaranteeLevel>,
 }
 
-/// Guarantee for the remaining plan, the strongest first.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum GuaranteeLevel {
-    /// The remaining plan works for all deviations within the envelope.
-    Envelope,
-    /// The remaining plan works for all deviations within a part of the envelope around the planned
-    /// values.
-    PartOfEnvelope,
-    /// The remaining plan works if all future actions take as long as planned, however long the
-    /// running actions take.
-    Planned,
-    /// The remaining plan may still work.
-    Luck,
-}
-
-impl GuaranteeLevel {
-    /// All of them, with their names in traces.
-    pub const NAMES: &[(Self, &str)] = &[
-        (Self::Envelope, "envelope"),
-        (Self::PartOfEnvelope, "part-of-envelope"),
-        (Self::Planned, "planned"),
-        (Self::Luck, "luck"),
-    ];
-
-    /// Returns the name used in traces.
-    pub fn name(self) -> &'static str {
-        let found = Self::NAMES.iter().find(|(promise, _)| *promise == self);
-        found.map_or("unknown", |(_, name)| name)
+terms! {
+    /// Guarantee for the remaining plan, the strongest first. The meaning is the condition under which the plan works.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+    pub enum GuaranteeLevel {
+        Envelope = "envelope": "each quantity stays inside its interval",
+        PartOfEnvelope = "part-of-envelope": "each quantity stays inside a part of its interval",
+        Planned = "planned": "each action still to start takes as long as planned",
+        Luck = "luck": "no condition is known",
     }
 }
 
-/// Kinds of [`Reason`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Cause {
-    /// All predecessors have been executed, and the window is open.
-    Due,
-    /// An event must happen first.
-    NothingDue,
-    /// An observed quantity is not in its interval.
-    OutsideInterval,
-    /// A running action has not ended by the upper end of its interval.
-    Outlived,
-    /// Too little time is left for a time point.
-    Unreachable,
-    /// A required condition does not hold.
-    Condition,
-    /// An action failed.
-    Failed,
-    /// Reports on the end of an action contradict each other.
-    Contradiction,
-    /// An observation differs from the belief, and the plan does not work with it.
-    Surprise,
-    /// An action has reached its time-out.
-    Silence,
-    /// The remaining plan is no longer guaranteed to work.
-    GuaranteeLost,
-    /// No order of the plan's actions leads to the goal.
-    NoOrder,
-    /// Another plan is more likely to succeed.
-    Likelier,
-    /// The guarantee has become weaker, and another plan may have a stronger one or more slack.
-    MoreSlack,
-    /// The plan was finished too late to be started.
-    Late,
-    /// The plan is done, but the goal is not reached.
-    PlanDone,
-    /// The goal is reached.
-    GoalReached,
-    /// A plan has been made.
-    NewPlan,
-    /// The goals were changed from outside.
-    Asked,
-    /// Part of the goal can never become true again.
-    NeverAgain,
-    /// Each part of the goal could still become true, but not all of them.
-    NotTogether,
-    /// A goal would be reached after its deadline.
-    TooLate,
+impl GuaranteeLevel {
+    /// Returns the name for users: the guarantee, or `none` with the weaker promise.
+    pub const fn label(self) -> &'static str {
+        match self {
+            Self::Envelope | Self::PartOfEnvelope => self.name(),
+            Self::Planned => "none, feasible at nominal durations",
+            Self::Luck => "none, may still work",
+        }
+    }
+
+    /// Returns the condition under which the plan works, if it is known.
+    pub fn condition(self) -> Option<&'static str> {
+        let found = Self::TERMS.iter().find(|(level, ..)| *level == self);
+        found
+            .filter(|_| self != Self::Luck)
+            .map(|(.., condition)| *condition)
+    }
 }
 
-impl Cause {
-    /// All of them, with their names in traces.
-    pub const NAMES: &[(Self, &str)] = &[
-        (Self::Due, "due"),
-        (Self::NothingDue, "nothing-due"),
-        (Self::OutsideInterval, "outside-interval"),
-        (Self::Outlived, "outlived"),
-        (Self::Unreachable, "unreachable"),
-        (Self::Condition, "condition"),
-        (Self::Failed, "failed"),
-        (Self::Contradiction, "contradiction"),
-        (Self::Surprise, "surprise"),
-        (Self::Silence, "silence"),
-        (Self::GuaranteeLost, "guarantee-lost"),
-        (Self::NoOrder, "no-order"),
-        (Self::Likelier, "likelier"),
-        (Self::MoreSlack, "more-slack"),
-        (Self::Late, "late"),
-        (Self::PlanDone, "plan-done"),
-        (Self::GoalReached, "goal-reached"),
-        (Self::NewPlan, "new-plan"),
-        (Self::Asked, "asked"),
-        (Self::NeverAgain, "never-again"),
-        (Self::NotTogether, "not-together"),
-        (Self::TooLate, "too-late"),
-    ];
-
-    /// Returns the name used in traces.
-    pub fn name(self) -> &'static str {
-        let found = Self::NAMES.iter().find(|(cause, _)| *cause == self);
-        found.map_or("unknown", |(_, name)| name)
+terms! {
+    /// Kinds of [`Reason`].
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+    pub enum Cause {
+        Due = "due": "all predecessors have been executed, and the window is open",
+        NothingDue = "nothing-due": "an event must happen first",
+        OutsideInterval = "outside-interval": "an observed quantity is not in its interval",
+        Outlived = "outlived": "a running action has not ended by the upper end of its interval",
+        Unreachable = "unreachable": "too little time is left for a time point",
+        Condition = "condition": "a required condition does not hold",
+        Failed = "failed": "an action failed",
+        Contradiction = "contradiction": "reports on the end of an action contradict each other",
+        Surprise = "surprise":
+            "an observation differs from the belief, and the plan does not work with it",
+        Silence = "silence": "an action has reached its time-out",
+        GuaranteeLost = "guarantee-lost": "the remaining plan is no longer guaranteed to work",
+        NoOrder = "no-order": "no order of the plan's actions leads to the goal",
+        Likelier = "likelier": "another plan is more likely to succeed",
+        MoreSlack = "more-slack":
+            "the guarantee has become weaker, and another plan may have a stronger one or more slack",
+        Late = "late": "the plan was finished too late to be started",
+        PlanDone = "plan-done": "the plan is done, but the goal is not reached",
+        GoalReached = "goal-reached": "the goal is reached",
+        NewPlan = "new-plan": "a plan has been made",
+        Asked = "asked": "the goals were changed from outside",
+        NeverAgain = "never-again": "part of the goal can never become true again",
+        NotTogether = "not-together":
+            "each part of the goal could still become true, but not all of them",
+        TooLate = "too-late": "a goal would be reached after its deadline",
     }
 }
 

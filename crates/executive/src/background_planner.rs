@@ -140,7 +140,7 @@ impl Planner for BackgroundPlanner<'_> {
     fn expect(&mut self, task: &Task, situation: &Situation) {
         self.job = None;
         // A planner that compares probabilities reuses results for later plans.
-        if !self.spec.executor.needs_comparator() {
+        if !self.spec.executor.needs_odds() {
             self.job = self.spawn(task, situation);
         }
     }

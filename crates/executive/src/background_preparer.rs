@@ -69,7 +69,7 @@ impl BackgroundPreparer {
             .prepare_now(&mut analyst);
             if let Ok(mission) = &mission
                 && need != PlanForm::PartialOrder
-                && !executor.needs_comparator()
+                && !executor.uses_world_model()
             {
                 // Fills the cache of dispatchable networks.
                 let _ = executor.build(Box::new(ExactRegion)).adopt(mission);

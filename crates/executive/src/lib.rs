@@ -11,7 +11,7 @@
 //!   the observations of the run.
 //! - [`background_planner`], [`background_preparer`], [`completion_signal`]: planning during the run.
 //! - [`process_world`], [`world_protocol`], [`belief_updates`]: a world that is a process
-//!   (`docs/formats/world-protocol.md`). [`realtime`]: a simulated world on the wall clock.
+//!   (`docs/formats/world-protocol.md`). [`world_check`]: conformance test of such a world. [`realtime`]: a simulated world on the wall clock.
 //! - [`run`], [`resume`]: assembly of a run from its specification, and recovery from its journal.
 //! - [`EmbeddedWorld`]: a world that is an object in the process of its executive.
 //! - [`http`], [`api`], [`trace_buffer`]: HTTP server and client, the interface of an executive (`docs/serve.md`), and
@@ -51,6 +51,7 @@ pub mod resume;
 pub mod run;
 mod running_actions;
 pub mod trace_buffer;
+pub mod world_check;
 mod world_connection;
 pub mod world_protocol;
 

@@ -2,11 +2,7 @@
 
 use std::io;
 
-/// Returns a count with its noun: `1 check`, `2 checks`.
-pub fn count_with_noun(count: usize, what: &str) -> String {
-    let plural = if count == 1 { "" } else { "s" };
-    format!("{count} {what}{plural}")
-}
+pub use elbowroom::report::console::count_with_noun;
 
 /// Returns the message of an I/O error in lower case, without the error number of the operating system.
 pub fn io_error_message(error: &io::Error) -> String {

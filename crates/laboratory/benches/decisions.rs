@@ -146,7 +146,7 @@ fn rows(name: &str) {
                     comparator: None,
                     policy_cache: PolicyTableCache::default(),
                     order_cache: None,
-                    action_values: spec.needs_action_values().then(|| Arc::clone(&policy)),
+                    action_values: spec.needs().action_values.then(|| Arc::clone(&policy)),
                     rollout: None,
                 }),
                 times: times.clone(),

@@ -35,6 +35,7 @@ mod interval;
 pub mod log_concave;
 mod rational;
 pub mod simplex;
+mod terms;
 pub mod work;
 
 pub use accumulator::Accumulator;

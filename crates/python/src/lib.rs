@@ -70,11 +70,13 @@ mod native {
     #[pymodule_export]
     use crate::task::{Task, read};
 
+    use elbowroom::execution::executors::DEFAULT_EXECUTOR;
     use pyo3::prelude::*;
 
     /// The version of the package.
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
-        module.add("__version__", env!("CARGO_PKG_VERSION"))
+        module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+        module.add("DEFAULT_EXECUTOR", DEFAULT_EXECUTOR)
     }
 }

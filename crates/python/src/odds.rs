@@ -70,14 +70,7 @@ impl OddsOptions {
 /// Parses the names of executors.
 fn executors(names: &[String]) -> Result<Vec<ExecutorSpec>, CallError> {
     let read = names.iter().map(|name| name.parse::<ExecutorSpec>());
-    let read: Vec<_> = read.collect::<Result<_, _>>().map_err(CallError::request)?;
-    match read.iter().find(|spec| spec.needs_comparator()) {
-        Some(odd) => Err(CallError::Request(format!(
-            "`{odd}` compares plans during the execution, which `odds` does not sample; leave out \
-             the number, or use `compare`"
-        ))),
-        None => Ok(read),
-    }
+    read.collect::<Result<_, _>>().map_err(CallError::request)
 }
 
 /// The success probability of a plan: a document, the picture of all orders if it was requested,

@@ -9,6 +9,7 @@
 //! - [`statistics`]: proportions with Wilson's intervals, means.
 //! - [`table`]: tables as Markdown, CSV, or text for a terminal.
 //! - [`plot`]: plots of values with intervals, as SVG.
+//! - [`console`]: texts for consoles, with the table of tolerances.
 //! - [`decimal`]: exact numbers as decimals.
 //! - [`lattice`]: a picture of the orders of a plan, as SVG.
 //! - [`plane`]: a picture of areas and boxes over two quantities, as SVG.
@@ -26,6 +27,7 @@
 //! assert_eq!(table.csv(), "executor,success %\r\nguarded,95\r\n");
 //! ```
 
+pub mod console;
 pub mod decimal;
 pub mod exact;
 pub mod lattice;

@@ -234,13 +234,13 @@ impl<'a> Execution<'a> {
         }
     }
 
-    /// Reuses results of `lookahead` for the same problem and likelihoods from other runs.
+    /// Reuses policy tables for the same problem and likelihoods from other runs.
     pub fn with_foresight(self, foresight: PolicyTableCache) -> Self {
         Self { foresight, ..self }
     }
 
-    /// Sets the comparator of plans, for executors that search for likelier plans
-    /// ([`ExecutorSpec::needs_comparator`]).
+    /// Sets the comparator of plans, for executors that use it
+    /// ([`Needs::odds`](elbowroom_execution::executors::Needs::odds)).
     pub fn with_plan_comparator(self, odds: Option<Box<dyn PlanComparator>>) -> Self {
         Self {
             plan_comparator: odds,
@@ -248,8 +248,8 @@ impl<'a> Execution<'a> {
         }
     }
 
-    /// Sets the table of action values, for executors that evaluate each move
-    /// ([`ExecutorSpec::needs_action_values`]).
+    /// Sets the table of action values, for executors that use it
+    /// ([`Needs::action_values`](elbowroom_execution::executors::Needs::action_values)).
     pub fn with_action_values(self, outlook: Option<Arc<dyn ActionValues>>) -> Self {
         Self {
             action_values: outlook,
@@ -271,7 +271,8 @@ impl<'a> Execution<'a> {
         self.missing_table_reason.as_deref()
     }
 
-    /// Sets the rollouts, for executors that evaluate each move without a table of action values.
+    /// Sets the rollouts, for executors that use them
+    /// ([`Needs::rollouts`](elbowroom_execution::executors::Needs::rollouts)).
     pub fn with_rollouts<R: RunRollouts + 'a>(self, rollouts: Option<R>) -> Self {
         Self {
             rollouts: rollouts.map(|it| Box::new(it) as Box<dyn RunRollouts + 'a>),
@@ -341,18 +342,22 @@ impl<'a> Execution<'a> {
     /// Returns the run, to be driven step by step by an event loop, and the workers that answer its requests for
     /// plans.
     #[must_use = "a run does nothing until `next` is called"]
-    pub fn run(self) -> (Run<'a>, Box<dyn Workers + 'a>) {
+    pub fn run(mut self) -> (Run<'a>, Box<dyn Workers + 'a>) {
         let executor = match self.executor {
             ExecutorChoice::Custom(executor) => executor,
-            ExecutorChoice::Registered(executor) => executor.build(ExecutorServices {
-                region: Box::new(ExactRegion),
-                likelihoods: self.likelihoods,
-                comparator: self.plan_comparator,
-                policy_cache: self.foresight,
-                order_cache: None,
-                action_values: self.action_values,
-                rollout: self.rollouts.as_ref().map(|it| it.evaluator()),
-            }),
+            ExecutorChoice::Registered(executor) => {
+                let needs = executor.needs();
+                self.rollouts = self.rollouts.filter(|_| needs.rollouts);
+                executor.build(ExecutorServices {
+                    region: Box::new(ExactRegion),
+                    likelihoods: self.likelihoods,
+                    comparator: self.plan_comparator.filter(|_| executor.needs_odds()),
+                    policy_cache: self.foresight,
+                    order_cache: None,
+                    action_values: self.action_values.filter(|_| needs.action_values),
+                    rollout: self.rollouts.as_ref().map(|it| it.evaluator()),
+                })
+            }
         };
         let planner = self
             .planner

@@ -8,12 +8,14 @@
 //! - [`Candidates`]: different plans for a problem, from variants of it.
 //! - [`Rollouts`]: success rates of plans in simulated runs. [`PlanSelector`] races candidates in
 //!   them for the first plan of a run, and [`RolloutPolicy`] the next actions of a run.
-//! - [`ActionSets`]: the actions for the policy of [`elbowroom_mdp`].
+//! - [`action_values()`]: the table of action values for executors that use one, with the
+//!   [`ActionSets`] that bound it.
 //! - [`duration_distributions()`], [`mod@timeouts`]: durations of a plan in a world, and the
 //!   time-outs of its actions.
 //!
 //! This crate knows neither requests nor specifications: those are in the crate `elbowroom`.
 
+mod action_values;
 mod adversarial_world;
 pub mod box_search;
 mod cache;
@@ -39,6 +41,7 @@ pub mod timeouts;
 mod validating_recorder;
 mod vary;
 
+pub use action_values::action_values;
 pub use adversarial_world::AdversarialWorld;
 pub use box_search::{EnvelopeSettings, Search};
 pub use cache::{CachingPlanner, CachingPreparer};

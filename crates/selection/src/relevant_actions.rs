@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use elbowroom_execution::executors::ExecutorSpec;
+use elbowroom_execution::executors::{self, Role};
 use elbowroom_execution::run::{PlanningTime, RunSettings};
 use elbowroom_mdp::Settings;
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
@@ -120,10 +120,9 @@ fn fallbacks(
     let work = replanning.work;
     let rollouts = Rollouts {
         world: Arc::new(world.clone()),
-        // `guarded` replans at the first deviation, so more plans are found.
-        executor: "guarded"
-            .parse()
-            .unwrap_or_else(|_| ExecutorSpec::default()),
+        executor: executors::with_role(Role::EarlyReplanning)
+            .next()
+            .unwrap_or_default(),
         settings: RunSettings {
             planning_time: PlanningTime::Seconds(Rational::ZERO),
             ..RunSettings::default()

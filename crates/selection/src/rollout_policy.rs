@@ -5,7 +5,7 @@ mod sample_set;
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use elbowroom_execution::executors::{ExecutorServices, ExecutorSpec, OrderCache};
+use elbowroom_execution::executors::{self, ExecutorServices, ExecutorSpec, OrderCache, Role};
 use elbowroom_execution::run::PlanningTime;
 use elbowroom_execution::run::situation::{OverrunEstimate, remaining_plan_of, situation_at};
 use elbowroom_execution::{
@@ -28,16 +28,6 @@ use crate::race::{Rules, Tally, is_behind, race};
 use crate::renumbering::renumbered;
 use crate::rollouts::Rollouts;
 use sample_set::SampleSet;
-
-/// Executors that may adopt a new plan instead of `live`.
-const INITIAL_PLAN_EXECUTORS: [&str; 3] = ["adaptable", "esterel", "guarded"];
-
-/// Executors that may adopt the remaining plan. Others need its envelope, which takes long to
-/// compute.
-const REMAINING_PLAN_EXECUTORS: [&str; 2] = ["adaptable", "esterel"];
-
-/// Executors for new plans.
-const NEW_PLAN_EXECUTORS: [&str; 2] = ["live", "adaptable"];
 
 /// Number of samples at the end of each round.
 const ROUNDS: [u64; 4] = [25, 50, 100, 200];
@@ -68,8 +58,8 @@ const MOST_SEARCHES: usize = 6;
 /// Maximum number of states for all new plans in the samples of one scene.
 const SAMPLE_STATES: u64 = 4_000;
 
-/// The lead that another executor needs to adopt a new plan instead of `live`: one sample in
-/// `MARGIN`.
+/// The lead that another executor needs to adopt a new plan instead of the present one: one sample
+/// in `MARGIN`.
 const MARGIN: u64 = 200;
 
 /// Size of the preparers' caches.
@@ -357,22 +347,20 @@ impl RolloutPolicy {
         let Some(rest) = remaining_plan_of(task, &situation, scene.remaining_steps.to_vec()) else {
             return ways;
         };
-        let names: &[&str] = if scene.is_plan_new {
-            &INITIAL_PLAN_EXECUTORS
+        let role = if scene.is_plan_new {
+            Role::FirstPlan
         } else {
-            &REMAINING_PLAN_EXECUTORS
+            Role::RemainingPlan
         };
-        for name in names {
-            let Ok(executor) = name.parse::<ExecutorSpec>() else {
-                continue;
-            };
+        // The registry begins with the baselines. Of equally good executors, the last one is used.
+        for executor in executors::with_role(role).rev() {
             let wanted = PreparationRequest {
                 task,
                 plan: &rest,
                 situation: &situation,
                 running: &running,
                 now,
-                need: executor.registered.need,
+                need: executor.needs().plan,
             };
             if let Ok(mission) = wanted.prepare_now(&mut self.preparer) {
                 ways.push(Alternative::AdoptRemaining(executor, Box::new(mission)));
@@ -394,11 +382,9 @@ impl RolloutPolicy {
         let time = scene.belief.time() + &self.planning_time + task.epsilon();
         let (situation, _) = situation_at(scene.belief, time, OverrunEstimate::QuarterLonger);
         for plan in self.plans(&task.with_own_table(), &situation) {
-            for name in NEW_PLAN_EXECUTORS {
-                if let Ok(executor) = name.parse() {
-                    let plan = Some((situation.clone(), plan.clone()));
-                    ways.push(Alternative::Replan(executor, plan));
-                }
+            for executor in executors::with_role(Role::Evaluation) {
+                let plan = Some((situation.clone(), plan.clone()));
+                ways.push(Alternative::Replan(executor, plan));
             }
         }
         if let Some(until) = scene.belief.next_timed() {

@@ -30,7 +30,7 @@ const CACHE_SIZE: usize = 2_000;
 pub struct Rollouts {
     /// The world model.
     pub world: Arc<WorldModel>,
-    /// The executor. One that chooses among plans during execution is replaced by `live`.
+    /// The executor. One that uses a model of the world is replaced by the default executor.
     pub executor: ExecutorSpec,
     /// Settings of the runs.
     pub settings: RunSettings,
@@ -98,10 +98,8 @@ impl<'a> RolloutSession<'a> {
         work: u64,
         goes_on: &'a (dyn Fn() -> bool + Sync),
     ) -> Self {
-        if rollouts.executor.needs_comparator()
-            && let Ok(live) = "live".parse()
-        {
-            rollouts.executor = live;
+        if rollouts.executor.uses_world_model() {
+            rollouts.executor = ExecutorSpec::default();
         }
         // A measured planning time is not known in advance.
         if rollouts.settings.planning_time == PlanningTime::Measured {

@@ -11,7 +11,7 @@ use elbowroom::answers::run::{RunRequest, simulate};
 use elbowroom::answers::stn::{StnFinding, StnRequest, stn};
 use elbowroom::envelope::{BestSettings, Guarantee};
 use elbowroom::execute::{RunSpec, SpecError};
-use elbowroom::execution::executors::EXECUTORS;
+use elbowroom::execution::executors::{DEFAULT_EXECUTOR, EXECUTORS};
 use elbowroom::execution::run::{MissingPlan, TimeoutRule, Verdict};
 use elbowroom::model::validate::Settings;
 use elbowroom::model::{Task, TimeTriggeredPlan};
@@ -399,11 +399,16 @@ fn about() -> Result<Reply, Failure> {
             "summary": executor.summary,
         })
     });
+    let guarantees = Guarantee::TERMS.iter();
+    let guarantees = guarantees.map(|(_, name, meaning)| json!({"name": name, "meaning": meaning}));
     let about = json!({
         "format": "elbowroom-about",
         "version": 1,
         "elbowroom": env!("CARGO_PKG_VERSION"),
+        "default_executor": DEFAULT_EXECUTOR,
         "executors": executors.collect::<Vec<_>>(),
+        "default_guarantee": Guarantee::default(),
+        "guarantees": guarantees.collect::<Vec<_>>(),
     });
     Ok(Reply {
         exit: YES,

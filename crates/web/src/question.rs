@@ -180,7 +180,7 @@ pub struct RunQuestion {
     /// Probabilities for the executors that use them (`docs/formats/likelihoods.md`).
     #[serde(default)]
     pub likelihoods: Option<Text>,
-    /// The executor; `live` by default.
+    /// The executor; the default one if missing.
     #[serde(default)]
     pub executor: Option<String>,
     /// The seed of the world's random numbers.

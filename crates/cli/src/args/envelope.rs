@@ -4,12 +4,13 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use elbowroom::RoundingRule;
-use elbowroom::envelope as library;
+use elbowroom::envelope::{self as library, Guarantee, Objective};
 use elbowroom::execution::run::TimeoutRule;
 use elbowroom::num::Rational;
 
 use super::ProblemArgs;
 use super::number::{integer, positive, positive_or_zero, timeout};
+use super::term::term;
 use crate::exit::Failure;
 
 #[derive(Args, Debug)]
@@ -33,7 +34,7 @@ pub(crate) struct EnvelopeArgs {
     #[arg(long, value_enum)]
     method: Option<Method>,
     /// Objective that the largest box maximises; by default the least slack
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = term(Objective::TERMS))]
     objective: Option<Objective>,
     /// With --objective probability: the world file that says how long actions take
     /// (docs/formats/world.md)
@@ -58,7 +59,7 @@ pub(crate) struct EnvelopeArgs {
     #[arg(long)]
     pub(crate) sharpen: bool,
     /// The guarantee that holds inside the envelope; by default dynamic
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = term(Guarantee::TERMS))]
     pub(crate) guarantee: Option<Guarantee>,
     /// Add the plan's conditions to the network where they bound the difference of two times: the
     /// dispatcher then enforces them, and the envelope may be wider
@@ -272,19 +273,19 @@ impl EnvelopeArgs {
         };
         let default = library::BestSettings::default();
         let best = library::BestSettings {
-            objective: self.objective.map_or(default.objective, Into::into),
+            objective: self.objective.unwrap_or(default.objective),
             symmetric: self.symmetric,
             max_deviation: self.cap_or_default(),
             ..default
         };
         match (best.objective, &self.world) {
-            (library::Objective::Probability, None) => {
+            (Objective::Probability, None) => {
                 return Err(Failure::new(
                     "--objective probability needs distributions of the durations",
                     "add --world with a world file (docs/formats/world.md)",
                 ));
             }
-            (library::Objective::Probability, Some(_)) | (_, None) => {}
+            (Objective::Probability, Some(_)) | (_, None) => {}
             (_, Some(_)) => {
                 return Err(Failure::new(
                     "--world applies only to --objective probability",
@@ -335,32 +336,6 @@ pub(crate) enum BoxMethod {
     Best,
 }
 
-/// The objective of the largest box.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Objective {
-    /// The least slack of any bound, relative to the nominal value; then the second least, and so
-    /// on
-    LeastSlack,
-    /// The sum of the widths of all intervals, times the weights of --vary
-    Widths,
-    /// The product of the widths of all intervals, with the weights of --vary as exponents
-    Volume,
-    /// The probability that independent durations, distributed as in the world file of --world, all
-    /// stay inside
-    Probability,
-}
-
-impl From<Objective> for library::Objective {
-    fn from(objective: Objective) -> Self {
-        match objective {
-            Objective::LeastSlack => Self::LeastSlack,
-            Objective::Widths => Self::Widths,
-            Objective::Volume => Self::Volume,
-            Objective::Probability => Self::Probability,
-        }
-    }
-}
-
 /// The order of the rows of the table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Order {
@@ -377,27 +352,6 @@ pub(crate) enum Growth {
     Doubling,
     /// Keep it
     Constant,
-}
-
-/// The guarantee that holds inside an envelope.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Guarantee {
-    /// Weak controllability: a schedule exists for all values, if they are known in advance
-    Weak,
-    /// Dynamic controllability: an executor that observes each value only when it occurs succeeds
-    Dynamic,
-    /// Strong controllability: one fixed schedule works for all values
-    Strong,
-}
-
-impl From<Guarantee> for library::Guarantee {
-    fn from(guarantee: Guarantee) -> Self {
-        match guarantee {
-            Guarantee::Weak => Self::Weak,
-            Guarantee::Dynamic => Self::Dynamic,
-            Guarantee::Strong => Self::Strong,
-        }
-    }
 }
 
 /// The `--vary` specifications that make the durations of these actions the executor's choice.

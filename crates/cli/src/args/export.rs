@@ -4,12 +4,13 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
+use elbowroom::envelope::Guarantee;
 use elbowroom::num::Rational;
 use elbowroom::probability::optimum::DeadEnds;
 
 use super::ProblemArgs;
-use super::envelope::Guarantee;
 use super::number::positive;
+use super::term::term;
 
 #[derive(Args, Debug)]
 #[command(after_help = "\
@@ -40,7 +41,7 @@ pub(crate) struct ExportArgs {
     pub(crate) vary: Vec<String>,
     /// The guarantee that `smt2` checks; by default that of the answer, dynamic for a box, weak for
     /// the region
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = term(Guarantee::TERMS))]
     pub(crate) guarantee: Option<Guarantee>,
     /// Add the plan's conditions to the network where they bound the difference of two times, as
     /// for `elbowroom envelope`

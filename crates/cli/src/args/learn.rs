@@ -3,10 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use elbowroom::envelope::Guarantee;
 use elbowroom::num::Rational;
 
-use super::envelope::Guarantee;
 use super::number::positive;
+use super::term::term;
 
 #[derive(Args, Debug)]
 pub(crate) struct LearnArgs {
@@ -46,7 +47,7 @@ pub(crate) struct LearnArgs {
     #[arg(long, value_name = "FILE", requires = "inside")]
     pub(crate) plan: Option<PathBuf>,
     /// Guarantee that the plan must have in the intervals
-    #[arg(long, value_enum, default_value_t = Guarantee::Dynamic, requires = "inside")]
+    #[arg(long, value_parser = term(Guarantee::TERMS), default_value_t = Guarantee::Dynamic, requires = "inside")]
     pub(crate) guarantee: Guarantee,
     /// Minimum time between interfering happenings (epsilon)
     #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive)]

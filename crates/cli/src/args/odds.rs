@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use elbowroom::answers::odds::OddsSemantics;
+use elbowroom::execution::executors;
 use elbowroom::num::Rational;
 
 use super::ProblemArgs;
@@ -39,8 +40,7 @@ pub(crate) struct OddsArgs {
     /// A world on a clock (docs/formats/world.md): execute the plan in samples of it
     #[arg(long, value_name = "WORLD.toml")]
     pub(crate) world: Option<PathBuf>,
-    /// Executor of the samples, without and with new plans; `live` and `adaptable` by default
-    #[arg(long, value_name = "NAME", requires = "world")]
+    #[arg(long, value_name = "NAME", requires = "world", help = executor_help())]
     pub(crate) executor: Vec<String>,
     /// Number of samples
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = integer)]
@@ -84,4 +84,13 @@ impl From<SemanticsChoice> for OddsSemantics {
             SemanticsChoice::World => Self::World,
         }
     }
+}
+
+fn executor_help() -> String {
+    let usual = executors::with_role(executors::Role::Evaluation);
+    let usual: Vec<String> = usual.map(|executor| format!("`{executor}`")).collect();
+    format!(
+        "Executor of the samples, without and with new plans; {} by default",
+        usual.join(" and ")
+    )
 }

@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use elbowroom::answers::plan::PlanObjective;
 use elbowroom::num::Rational;
 
 use super::ProblemArgs;
@@ -32,8 +34,8 @@ pub(crate) struct PlanArgs {
     /// Compare plans by this in place of metric and makespan: `slack`, the deviation that all durations
     /// may have at the same time, in relation to their nominal values (docs/chosen-plans.md), or
     /// `probability`, the share of --world samples with success. Without a time limit, a fixed number of plans is compared
-    #[arg(long, value_enum, conflicts_with = "first")]
-    pub(crate) objective: Option<PlanObjectiveChoice>,
+    #[arg(long, value_parser = plan_objective(), conflicts_with = "first")]
+    pub(crate) objective: Option<PlanObjective>,
     /// The world file (docs/formats/world.md) for --objective probability
     // As in `RunArgs::spoil`: conflicts of the objective are conflicts of its world also.
     #[arg(long, value_name = "WORLD.toml", requires = "objective", conflicts_with_all = ["first", "jobs"])]
@@ -67,14 +69,17 @@ pub(crate) struct PlanArgs {
     pub(crate) json: bool,
 }
 
-/// Objective of planning.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum PlanObjectiveChoice {
-    /// The relative deviation that all its durations may have
-    #[value(alias = "room")]
-    Slack,
-    /// Share of successes in a world
-    Probability,
+fn plan_objective() -> impl TypedValueParser<Value = PlanObjective> {
+    let values = PlanObjective::TERMS
+        .iter()
+        .map(|(objective, name, meaning)| {
+            let value = PossibleValue::new(*name).help(*meaning);
+            match objective {
+                PlanObjective::Slack => value.alias("room"),
+                PlanObjective::Probability => value,
+            }
+        });
+    PossibleValuesParser::new(values).try_map(|name| name.parse::<PlanObjective>())
 }
 
 /// The planner that is always there.

@@ -4,15 +4,16 @@ use std::path::PathBuf;
 
 use clap::{ArgGroup, Args, ValueEnum};
 use elbowroom::answers::envelope::objective_of;
-use elbowroom::envelope as library;
+use elbowroom::envelope::{Guarantee, Method, Objective};
 use elbowroom::execution::executors::DEFAULT_EXECUTOR;
 use elbowroom::execution::run::TimeoutRule;
 use elbowroom::num::Rational;
 
 use super::CalendarArgs;
-use super::envelope::{BoxMethod, Guarantee, Objective, controllable};
+use super::envelope::{BoxMethod, controllable};
 use super::number::{count, factor, integer, positive, positive_or_zero, timeout};
 use super::plan::EMBEDDED;
+use super::term::term;
 use crate::exit::Failure;
 use elbowroom_executive::http::Address;
 
@@ -136,7 +137,7 @@ pub(crate) struct RunArgs {
     #[arg(long, value_name = "ACTION")]
     pub(crate) controllable: Vec<String>,
     /// The guarantee that holds inside the envelopes
-    #[arg(long, value_enum, default_value_t = Guarantee::Dynamic)]
+    #[arg(long, value_parser = term(Guarantee::TERMS), default_value_t = Guarantee::Dynamic)]
     pub(crate) guarantee: Guarantee,
     /// The algorithm for envelopes, see `elbowroom help envelope`; by default `best`, and `irr` with
     /// --precision
@@ -147,7 +148,7 @@ pub(crate) struct RunArgs {
     #[arg(long, value_name = "B", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) precision: Option<Rational>,
     /// The objective of the envelopes, see `elbowroom help envelope`; by default `least-slack`
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = term(Objective::TERMS))]
     pub(crate) objective: Option<Objective>,
     /// Treatment of running actions when a new plan is made
     #[arg(long, value_enum, default_value_t = RunningChoice::Keep)]
@@ -254,13 +255,12 @@ impl RunArgs {
     ///
     /// # Errors
     /// When IRR is asked for something that only the largest box has.
-    pub(crate) fn objective(&self) -> Result<Option<library::Objective>, Failure> {
+    pub(crate) fn objective(&self) -> Result<Option<Objective>, Failure> {
         let method = self.method.map(|method| match method {
-            BoxMethod::Irr => library::Method::Irr,
-            BoxMethod::Best => library::Method::Best,
+            BoxMethod::Irr => Method::Irr,
+            BoxMethod::Best => Method::Best,
         });
-        let objective = self.objective.map(Into::into);
-        objective_of(method, objective, self.precision.is_some()).map_err(|_| {
+        objective_of(method, self.objective, self.precision.is_some()).map_err(|_| {
             Failure::new(
                 "--objective applies to the largest box, which --method irr does not compute",
                 "leave out --method irr, or --objective",

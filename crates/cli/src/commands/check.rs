@@ -14,10 +14,10 @@ use elbowroom::text::{Record, Severity};
 
 use crate::args::{CheckArgs, DiagnosticsForm};
 use crate::exit::{Answer, Exit, Failure};
-use crate::limits::push_wrapped;
 use crate::output::Output;
-use crate::terminal::{EMPHASIS, ERROR, SECONDARY, SUCCESS, TextLayout, styled};
+use crate::terminal::{EMPHASIS, ERROR, SECONDARY, SUCCESS, TextLayout, stdout_layout, styled};
 use crate::{input, number, output};
+use elbowroom::report::console::push_wrapped;
 use elbowroom_executive::messages::count_with_noun;
 
 /// Advice if the given plan is an STN plan.
@@ -96,7 +96,7 @@ fn validate_plan(arguments: &CheckArgs, output: &mut Output) -> Answer {
     if arguments.json {
         output.document(&answer)?;
     } else {
-        output::print(&text(&task, &answer, TextLayout::of_stdout()))?;
+        output::print(&text(&task, &answer, stdout_layout()))?;
         if is_invalid {
             input::advise_repair();
         }

@@ -17,7 +17,7 @@ use crate::exit::{Answer, Exit, Failure};
 use crate::interrupt::Interrupt;
 use crate::output::Output;
 use crate::progress::Progress;
-use crate::terminal::{ERROR, TextLayout, styled};
+use crate::terminal::{ERROR, stdout_layout, styled};
 use crate::time_limit::Stopwatch;
 use crate::{input, output};
 use elbowroom_executive::messages::io_error_message;
@@ -71,7 +71,7 @@ pub(crate) fn run(arguments: &CompareArgs, output: &mut Output) -> Answer {
     if arguments.json {
         output.json(&answer.json())?;
     } else {
-        output::print(&table.fit_to_width(TextLayout::of_stdout().width))?;
+        output::print(&table.fit_to_width(stdout_layout().width))?;
     }
     // The results of an interrupted experiment are printed and written, but the exit code is not 0.
     written.map(|()| {

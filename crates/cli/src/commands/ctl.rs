@@ -5,6 +5,7 @@ use std::io::{self, ErrorKind};
 use std::time::Duration;
 
 use elbowroom::answers::exact::{INFINITY, MINUS_INFINITY};
+use elbowroom::execution::GuaranteeLevel;
 use elbowroom::num::work::Stop;
 use elbowroom::num::{End, Rational};
 use elbowroom::report::exact::Exact;
@@ -22,8 +23,8 @@ use crate::args::{CtlArgs, CtlCommand};
 use crate::exit::{Answer, Exit, Failure};
 use crate::number::nearest;
 use crate::output::{self, Output};
-use crate::terminal::{EMPHASIS, TextLayout, styled};
-use crate::wrap::wrap;
+use crate::terminal::{EMPHASIS, stdout_layout, styled};
+use elbowroom::report::console::wrap;
 
 /// Sends the request and prints the answer.
 pub(crate) fn run(arguments: &CtlArgs, output: &mut Output) -> Answer {
@@ -335,7 +336,7 @@ fn goals(goals: &GoalsNow) -> String {
         if let Some(why) = &goal.why {
             let _ = write!(line, "; {}", escape_control(why));
         }
-        let _ = writeln!(text, "{}", wrap(&line, TextLayout::of_stdout().width, 2));
+        let _ = writeln!(text, "{}", wrap(&line, stdout_layout().width, 2));
     }
     if text.is_empty() {
         text.push_str("there is no goal\n");
@@ -356,14 +357,14 @@ fn state(state: &State) -> String {
     text.push('\n');
     if let Some(why) = &state.restarting {
         let why = format!("world restarting: {}", escape_control(why));
-        let _ = writeln!(text, "{}", wrap(&why, TextLayout::of_stdout().width, 2));
+        let _ = writeln!(text, "{}", wrap(&why, stdout_layout().width, 2));
     }
     if let Some(seconds) = state.unanswered {
         let why = format!(
             "the world has not answered for {seconds} s: until it does, no action is started and \
              no request is processed"
         );
-        let _ = writeln!(text, "{}", wrap(&why, TextLayout::of_stdout().width, 2));
+        let _ = writeln!(text, "{}", wrap(&why, stdout_layout().width, 2));
     }
     for goal in &state.goals {
         let (name, pddl) = (escape_control(&goal.name), escape_control(&goal.goal));
@@ -412,7 +413,7 @@ fn state(state: &State) -> String {
             "{name} is in doubt since {since}: {}",
             escape_control(&doubt.why)
         );
-        let _ = writeln!(text, "{}", wrap(&line, TextLayout::of_stdout().width, 2));
+        let _ = writeln!(text, "{}", wrap(&line, stdout_layout().width, 2));
     }
     let _ = writeln!(text, "  {}", count_with_noun(state.facts.len(), "fact"));
     for fact in &state.facts {
@@ -447,19 +448,15 @@ fn plan(plan: &PlanNow) -> String {
 }
 
 fn guarantee(guarantee: &GuaranteeNow) -> String {
-    let (name, condition) = match guarantee.promise.as_deref() {
-        Some("envelope") => ("envelope", Some("each quantity stays inside its interval")),
-        Some("part-of-envelope") => (
-            "part-of-envelope",
-            Some("each quantity stays inside a part of its interval"),
-        ),
-        Some("planned") => (
-            "none, feasible at nominal durations",
-            Some("each action still to start takes as long as planned"),
-        ),
-        Some(_) => ("none, may still work", None),
-        None => ("none", None),
+    let promise = guarantee.promise.as_deref();
+    let mut known = GuaranteeLevel::TERMS.iter();
+    let level = known.find(|(_, name, _)| Some(*name) == promise);
+    let name = match level {
+        Some((level, ..)) => level.label(),
+        None if promise.is_some() => GuaranteeLevel::Luck.label(),
+        None => "none",
     };
+    let condition = level.and_then(|(level, ..)| level.condition());
     let mut text = format!("guarantee: {name}");
     if let Some(since) = &guarantee.since {
         let _ = write!(text, ", since {}", nearest(&since.0));

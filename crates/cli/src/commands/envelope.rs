@@ -15,7 +15,7 @@ use elbowroom::plan::parametrize::VarySpec;
 use crate::args::{self, EnvelopeArgs};
 use crate::exit::{Answer, Exit, Failure};
 use crate::output::Output;
-use crate::terminal::TextLayout;
+use crate::terminal::stdout_layout;
 use crate::{input, output};
 use monitor::EnvelopeMonitor;
 
@@ -41,9 +41,7 @@ pub(crate) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
     let request = EnvelopeRequest {
         name: arguments.plan.display().to_string(),
         vary,
-        guarantee: arguments
-            .guarantee
-            .map_or_else(Default::default, Into::into),
+        guarantee: arguments.guarantee.unwrap_or_default(),
         enforce: arguments.enforce,
         timeout: arguments.timeout.clone().unwrap_or_default(),
         contains: arguments.contains.clone(),
@@ -75,7 +73,7 @@ pub(crate) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
             &request,
             &outcome,
             arguments.order.unwrap_or(args::Order::Plan),
-            TextLayout::of_stdout(),
+            stdout_layout(),
         ))?;
         if matches!(outcome.answer.finding, EnvelopeFinding::Fails(_)) {
             input::advise_repair();

@@ -18,10 +18,10 @@ use elbowroom_export::{self as export, ExportError};
 use crate::args::{self, ExportArgs, ExportFormat};
 use crate::commands::envelope::specifications;
 use crate::exit::{Answer, Exit, Failure};
-use crate::limits::push_wrapped;
 use crate::output::Output;
 use crate::terminal::{ERROR, HINT, TextLayout, styled};
 use crate::{input, output};
+use elbowroom::report::console::push_wrapped;
 
 /// Writes a network, a box check or a region.
 pub(crate) fn run(arguments: &ExportArgs, output: &mut Output) -> Answer {
@@ -158,7 +158,7 @@ fn requested_box(
     plan: &ParametrizedPlan,
     task: &Task,
 ) -> Result<Option<(DecoupledEnvelope, Guarantee)>, Failure> {
-    let guarantee: Option<Guarantee> = arguments.guarantee.map(Into::into);
+    let guarantee: Option<Guarantee> = arguments.guarantee;
     if let Some(text) = &arguments.contains {
         let envelope = parse_box(text, plan);
         let envelope =

@@ -13,9 +13,11 @@ use serde_json::Value;
 use crate::args::{DurationsChoice, NetworkArgs};
 use crate::exit::{Answer, Exit, Failure};
 use crate::input;
-use crate::limits::push_wrapped;
 use crate::output::{self, Output};
-use crate::terminal::{EMPHASIS, ERROR, HINT, SECONDARY, SUCCESS, TextLayout, styled};
+use crate::terminal::{
+    EMPHASIS, ERROR, HINT, SECONDARY, SUCCESS, TextLayout, stdout_layout, styled,
+};
+use elbowroom::report::console::push_wrapped;
 use elbowroom_executive::messages::count_with_noun;
 
 /// Maximum number of bounds printed of a reason; `--json` has all.
@@ -62,7 +64,7 @@ pub(crate) fn run(arguments: &NetworkArgs, output: &mut Output) -> Answer {
     if arguments.json {
         output.json(&document(&arguments.file, &found)?)?;
     } else if on_stdout == 0 {
-        output::print(&report(text.name(), &found, TextLayout::of_stdout()))?;
+        output::print(&report(text.name(), &found, stdout_layout()))?;
     }
     Ok(if found.is_executable() {
         Exit::Yes

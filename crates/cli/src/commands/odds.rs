@@ -1,7 +1,5 @@
 //! `elbowroom odds`: success probability of a plan.
 
-mod text;
-
 use std::sync::Arc;
 
 use elbowroom::RoundingRule;
@@ -13,7 +11,7 @@ use crate::exit::{Answer, Exit, Failure};
 use crate::input;
 use crate::interrupt::Interrupt;
 use crate::output::{self, Output};
-use crate::terminal::TextLayout;
+use crate::terminal::stdout_layout;
 use crate::time_limit::Stopwatch;
 
 /// Computes the success probability of a plan.
@@ -64,7 +62,7 @@ pub(crate) fn run(arguments: &OddsArgs, output: &mut Output) -> Answer {
     if arguments.json {
         output.document(&answer)?;
     } else {
-        let text = text::render(&answer, arguments.layers, TextLayout::of_stdout());
+        let text = answer.text(arguments.layers, stdout_layout());
         output::print(&text)?;
     }
     written?;
@@ -99,16 +97,6 @@ fn settings(arguments: &OddsArgs) -> Result<OddsSettings, Failure> {
                 Failure::new(error, "`elbowroom run --help` describes them all")
             },
         )?;
-        if let Some(odd) = settings
-            .executors
-            .iter()
-            .find(|spec| spec.needs_comparator())
-        {
-            return Err(Failure::new(
-                format!("`{odd}` compares plans during execution, which `odds` does not sample"),
-                "leave out the number in its name, or use `elbowroom compare`",
-            ));
-        }
     }
     Ok(settings)
 }

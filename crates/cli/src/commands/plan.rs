@@ -7,8 +7,8 @@ mod text;
 use std::sync::Arc;
 
 use elbowroom::answers::plan::{
-    BestPlanRequest, PlanAim, PlanFinding, PlanOutcome, PlanRequest, best_plan, plan, plan_with,
-    stopped_before_reading,
+    BestPlanRequest, PlanAim, PlanFinding, PlanObjective, PlanOutcome, PlanRequest, best_plan,
+    plan, plan_with, stopped_before_reading,
 };
 use elbowroom::answers::{Observer, RequestError};
 use elbowroom::execute::SpecError;
@@ -20,11 +20,11 @@ use elbowroom_calendar::Calendar;
 
 use super::run::spec::contradiction_failure;
 use super::threads::{self, ALL_PROCESSORS};
-use crate::args::{EMBEDDED, PlanArgs, PlanObjectiveChoice};
+use crate::args::{EMBEDDED, PlanArgs};
 use crate::exit::{Answer, Exit, Failure};
 use crate::input::ReadProblem;
 use crate::output::Output;
-use crate::terminal::TextLayout;
+use crate::terminal::stdout_layout;
 use crate::{input, output};
 use monitor::PlanMonitor;
 
@@ -99,7 +99,7 @@ fn write_exactly(arguments: &PlanArgs, task: &Task, outcome: &mut PlanOutcome) {
 /// Searches for the best plan by an objective and prints it.
 fn run_with_objective(
     arguments: &PlanArgs,
-    objective: PlanObjectiveChoice,
+    objective: PlanObjective,
     planner: Option<&Planner>,
     read: ReadProblem,
     mut watch: PlanMonitor,
@@ -114,20 +114,20 @@ fn run_with_objective(
     let task = &Arc::new(read.task);
     let world;
     let aim = match (objective, &arguments.world) {
-        (PlanObjectiveChoice::Slack, None) => PlanAim::Slack,
-        (PlanObjectiveChoice::Slack, Some(_)) => {
+        (PlanObjective::Slack, None) => PlanAim::Slack,
+        (PlanObjective::Slack, Some(_)) => {
             return Err(Failure::new(
                 "--world has no effect with `--objective slack`",
                 "leave it out, or use --objective probability",
             ));
         }
-        (PlanObjectiveChoice::Probability, None) => {
+        (PlanObjective::Probability, None) => {
             return Err(Failure::new(
                 "`--objective probability` needs a world file",
                 "give one with --world (docs/formats/world.md)",
             ));
         }
-        (PlanObjectiveChoice::Probability, Some(path)) => {
+        (PlanObjective::Probability, Some(path)) => {
             let source = input::source(path, "world")?;
             world = WorldModel::read(source, task.problem())
                 .map_err(|wrong| contradiction_failure(SpecError::World(wrong)))?;
@@ -198,7 +198,7 @@ fn print(
     } else if let (Some(plan), None) = (&plan, &arguments.output) {
         output::print(plan)?;
     }
-    let certified = text::certificate_text(answer, TextLayout::of_stdout());
+    let certified = text::certificate_text(answer, stdout_layout());
     if let Some(line) = certified.filter(|_| !arguments.json) {
         output::print_to_stderr(&line);
     }

@@ -8,10 +8,10 @@ use elbowroom::plan::{ParametrizedPlan, format};
 
 use crate::args::StnArgs;
 use crate::exit::{Answer, Exit, Failure};
-use crate::limits::push_wrapped;
 use crate::output::Output;
 use crate::terminal::{ERROR, TextLayout, styled};
 use crate::{input, output};
+use elbowroom::report::console::push_wrapped;
 
 /// Writes the STN plan and the other requested output.
 pub(crate) fn run(arguments: &StnArgs, output: &mut Output) -> Answer {

@@ -18,10 +18,10 @@ use serde_json::{Value, json};
 
 use crate::args::{ProblemArgs, VerifyArgs};
 use crate::exit::{Answer, Exit, Failure};
-use crate::limits::push_wrapped;
 use crate::output::{self, Output};
-use crate::terminal::{ERROR, SUCCESS, TextLayout, styled};
+use crate::terminal::{ERROR, SUCCESS, TextLayout, stdout_layout, styled};
 use crate::{input, number};
+use elbowroom::report::console::push_wrapped;
 
 /// Checks an answer and prints the proved claims.
 pub(crate) fn run(arguments: &VerifyArgs, output: &mut Output) -> Answer {
@@ -54,12 +54,7 @@ pub(crate) fn run(arguments: &VerifyArgs, output: &mut Output) -> Answer {
             if arguments.json {
                 output.json(&document(Ok(&verified), is_derived))?;
             } else {
-                output::print(&proof_text(
-                    name,
-                    &verified,
-                    is_derived,
-                    TextLayout::of_stdout(),
-                ))?;
+                output::print(&proof_text(name, &verified, is_derived, stdout_layout()))?;
             }
             Ok(Exit::Yes)
         }
@@ -72,12 +67,7 @@ pub(crate) fn run(arguments: &VerifyArgs, output: &mut Output) -> Answer {
                 output.json(&document(Err(&wrong), is_derived))?;
             } else {
                 let mut text = format!("{}: {name}\n", styled(ERROR, "not proved"));
-                push_wrapped(
-                    &mut text,
-                    &format!("{wrong}."),
-                    2,
-                    TextLayout::of_stdout().width,
-                );
+                push_wrapped(&mut text, &format!("{wrong}."), 2, stdout_layout().width);
                 output::print(&text)?;
             }
             Ok(if wrong.is_limit() {

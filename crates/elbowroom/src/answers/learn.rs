@@ -6,6 +6,7 @@ mod conformal_box;
 mod fact_history;
 mod known_sections;
 mod prediction;
+mod text;
 mod timeouts;
 
 use elbowroom_learning::fit::Fit;

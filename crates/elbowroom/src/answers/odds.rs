@@ -4,11 +4,12 @@ mod executed;
 mod improvements;
 mod lattice;
 mod order;
+mod text;
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use elbowroom_execution::executors::ExecutorSpec;
+use elbowroom_execution::executors::{self, ExecutorSpec, Role};
 use elbowroom_execution::{PlanAnswer, Planner};
 use elbowroom_model::validate::{self, Verdict};
 use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan};
@@ -72,16 +73,15 @@ pub struct OddsSettings {
 }
 
 impl Default for OddsSettings {
-    /// Returns the settings of paper 2, with 1000 samples for `live` and `adaptable`.
+    /// Returns the settings of paper 2, with 1000 samples for each executor that evaluates plans.
     fn default() -> Self {
-        let executors = ["live", "adaptable"].iter().map(|name| name.parse());
         Self {
             semantics: OddsSemantics::default(),
             takes_best_order: false,
             most_sequences: 50_000,
             with_lattice: false,
             self_overlap: false,
-            executors: executors.filter_map(Result::ok).collect(),
+            executors: executors::with_role(Role::Evaluation).collect(),
             samples: 1000,
             seed: 0,
         }

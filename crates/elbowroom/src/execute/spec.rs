@@ -270,11 +270,10 @@ impl RunSpec {
     /// planning times, and the planner keeps no state between plans.
     pub fn can_plan_in_background(&self) -> bool {
         let has_clock = self.world_process.is_some() || self.realtime.is_some();
-        let keeps = self.executor.needs_comparator() || self.executor.needs_action_values();
         has_clock
             && self.planning_time == PlanningTime::Measured
             && self.planner != NO_PLANNER
-            && !keeps
+            && !self.executor.uses_world_model()
     }
 
     /// Returns the quantities to vary, and the settings of the search for envelopes.

@@ -11,7 +11,6 @@ mod course_kept;
 mod deorder_sound;
 mod derived_certificates;
 mod execution;
-mod executors_page;
 mod export;
 #[allow(dead_code, unused_imports, reason = "shared with other programs")]
 #[path = "../../../../testing/game.rs"]

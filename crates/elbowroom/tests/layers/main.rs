@@ -19,7 +19,9 @@ use std::process::Command;
 use toml::{Table, Value};
 
 mod documents;
+mod executor_names;
 mod modules;
+mod terms;
 mod wording;
 
 /// Crates by folder, lowest first, with their permitted dependencies.

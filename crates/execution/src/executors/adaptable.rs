@@ -15,7 +15,7 @@ use elbowroom_probability::{
 };
 
 use super::happening_choice::HappeningChooser;
-use super::{ExecutorEntry, PolicyTableCache};
+use super::{ExecutorEntry, Needs, PolicyTableCache, Role};
 use crate::dispatch::replan;
 use crate::executor::PlanForm;
 use crate::executor::{Decided, DecisionContext, Executor, Planned, PreparedPlan, StepId};
@@ -32,7 +32,11 @@ pub(super) const REGISTERED: ExecutorEntry = ExecutorEntry {
               present state: it skips, repeats and reorders actions where that is more likely to \
               succeed and time permits, and replans when no order reaches the goal.",
     paper: "Olisipo in Ribeiro et al. (2021), sections 2.2.1 and 2.2.2",
-    need: PlanForm::PartialOrder,
+    needs: Needs {
+        orders: true,
+        ..Needs::plan(PlanForm::PartialOrder)
+    },
+    roles: &[Role::FirstPlan, Role::RemainingPlan, Role::Evaluation],
     make: |_, means| {
         Box::new(Adaptable {
             initial: InitialBelief::of(&means.likelihoods),
@@ -66,7 +70,7 @@ pub(super) struct Adaptable {
 
 impl Executor for Adaptable {
     fn need(&self) -> PlanForm {
-        REGISTERED.need
+        REGISTERED.needs.plan
     }
 
     fn adopt(&mut self, mission: &PreparedPlan) -> Result<(), Box<Reason>> {

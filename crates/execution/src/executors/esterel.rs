@@ -4,7 +4,7 @@ use elbowroom_num::Rational;
 use elbowroom_plan::uncertain::ConstraintRole;
 use elbowroom_plan::{Bound, Constraint, Node, NodeId};
 
-use super::ExecutorEntry;
+use super::{ExecutorEntry, Needs, Role};
 use crate::dispatch::{Bounds, Dispatch, PropagationReach, replan};
 use crate::event::Ending;
 use crate::executor::PlanForm;
@@ -23,7 +23,8 @@ pub(super) const REGISTERED: ExecutorEntry = ExecutorEntry {
               or when the plan is over without reaching the goal. It ignores deadlines and \
               durations.",
     paper: "the Esterel Dispatcher of ROSPlan, the baseline in Ribeiro et al. (2021), section 3",
-    need: PlanForm::Network,
+    needs: Needs::plan(PlanForm::Network),
+    roles: &[Role::FirstPlan, Role::RemainingPlan],
     make: |_, _| Box::new(Esterel { dispatch: None }),
 };
 
@@ -36,7 +37,7 @@ struct Esterel {
 
 impl Executor for Esterel {
     fn need(&self) -> PlanForm {
-        REGISTERED.need
+        REGISTERED.needs.plan
     }
 
     fn adopt(&mut self, mission: &PreparedPlan) -> Result<(), Box<Reason>> {

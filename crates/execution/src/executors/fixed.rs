@@ -3,7 +3,7 @@
 use elbowroom_num::{Interval, Rational};
 use elbowroom_plan::{Bound, Constraint, Node, NodeId, Schedule, StnPlan};
 
-use super::ExecutorEntry;
+use super::{ExecutorEntry, Needs};
 use crate::dispatch::{Bounds, Dispatch, PropagationReach, constant_bounds, replan};
 use crate::executor::PlanForm;
 use crate::executor::{Decided, DecisionContext, Executor, Planned, PreparedPlan, StepId};
@@ -18,7 +18,8 @@ pub(super) const REGISTERED: ExecutorEntry = ExecutorEntry {
               value by more than X %. It checks only the constraints of the next time point, so \
               that it notices a missed deadline late.",
     paper: "BLEX(X) in Cashmore et al. (2020), section 5",
-    need: PlanForm::Orderings,
+    needs: Needs::plan(PlanForm::Orderings),
+    roles: &[],
     make: |argument, _| Box::new(Fixed::new(&argument.unwrap_or_default())),
 };
 
@@ -88,7 +89,7 @@ fn anchor_timed_initials(plan: &mut StnPlan, nominal: &Schedule) {
 
 impl Executor for Fixed {
     fn need(&self) -> PlanForm {
-        REGISTERED.need
+        REGISTERED.needs.plan
     }
 
     fn adopt(&mut self, mission: &PreparedPlan) -> Result<(), Box<Reason>> {

@@ -3,7 +3,7 @@
 use elbowroom_num::{End, Interval, Rational};
 use elbowroom_plan::{Constraint, DecoupledEnvelope, InstanceId, Valuation};
 
-use super::{ExecutorEntry, guarantee_status};
+use super::{ExecutorEntry, Needs, Role, guarantee_status};
 use crate::dispatch::{Dispatch, replan};
 use crate::executor::{
     Decided, Decision, DecisionContext, Executor, PlanForm, Planned, PreparedPlan, StepId,
@@ -20,7 +20,8 @@ pub(super) const REGISTERED: ExecutorEntry = ExecutorEntry {
               bound, or too little time is left. If only a start is late, it continues with a \
               smaller envelope, if there is one.",
     paper: "DREEX, Algorithm 2 in Cashmore et al. (2020)",
-    need: PlanForm::Envelope,
+    needs: Needs::plan(PlanForm::Envelope),
+    roles: &[Role::FirstPlan, Role::EarlyReplanning],
     make: |_, _| Box::new(Guarded { state: None }),
 };
 
@@ -48,7 +49,7 @@ struct GuardedPlan {
 
 impl Executor for Guarded {
     fn need(&self) -> PlanForm {
-        REGISTERED.need
+        REGISTERED.needs.plan
     }
 
     fn adopt(&mut self, mission: &PreparedPlan) -> Result<(), Box<Reason>> {

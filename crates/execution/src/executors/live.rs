@@ -16,7 +16,7 @@ use elbowroom_plan::{Bound, InstanceId, ParameterId, ParametrizedPlan, Valuation
 
 use self::repetition::Repetition;
 use self::without_guarantee::{ReductionClass, UnguaranteedPlan};
-use super::{ExecutorEntry, esterel, guarantee_status};
+use super::{ExecutorEntry, Need, Needs, Role, esterel, guarantee_status};
 use crate::dispatch::{Bounds, Dispatch, replan};
 use crate::event::Measured;
 use crate::executor::{
@@ -42,7 +42,11 @@ pub(super) const REGISTERED: ExecutorEntry = ExecutorEntry {
               another plan is more likely to succeed, by at least that number of percentage \
               points, in the world that the world file describes.",
     paper: "goes beyond Cashmore et al. (2020)",
-    need: PlanForm::OpenNetwork,
+    needs: Needs {
+        odds: Need::WithArgument,
+        ..Needs::plan(PlanForm::OpenNetwork)
+    },
+    roles: &[Role::Evaluation],
     make: |argument, means| {
         let advantage = argument.map(|points| points / Rational::from(100));
         Box::new(Live {
@@ -100,7 +104,7 @@ struct ExecutedPlan {
 
 impl Executor for Live {
     fn need(&self) -> PlanForm {
-        REGISTERED.need
+        REGISTERED.needs.plan
     }
 
     fn adopt(&mut self, mission: &PreparedPlan) -> Result<(), Box<Reason>> {

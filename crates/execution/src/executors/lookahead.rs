@@ -7,8 +7,8 @@ use elbowroom_model::ground::Condition;
 use elbowroom_probability::Likelihoods;
 use elbowroom_probability::optimum::PolicyTable;
 
-use super::ExecutorEntry;
 use super::adaptable::Adaptable;
+use super::{ExecutorEntry, Needs};
 use crate::executor::PlanForm;
 
 pub(super) const REGISTERED: ExecutorEntry = ExecutorEntry {
@@ -21,7 +21,11 @@ pub(super) const REGISTERED: ExecutorEntry = ExecutorEntry {
               other worlds it acts like `adaptable`, but chooses the most likely order again \
               before each start if the plan is short.",
     paper: "goes beyond Ribeiro et al. (2021)",
-    need: PlanForm::PartialOrder,
+    needs: Needs {
+        orders: true,
+        ..Needs::plan(PlanForm::PartialOrder)
+    },
+    roles: &[],
     make: |_, means| {
         Box::new(Adaptable::with_policy_tables(
             means.likelihoods,

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use elbowroom_model::ground::FactId;
 use elbowroom_num::Rational;
 
-use super::{ExecutorEntry, live};
+use super::{ExecutorEntry, Need, Needs, live};
 use crate::action_values::ActionValues;
 use crate::belief_state::GoalStatus as Prospect;
 use crate::dispatch::replan;
@@ -32,12 +32,18 @@ pub(super) const REGISTERED: ExecutorEntry = ExecutorEntry {
               start an action, to cancel one, or to wait, whether or not it is in the plan. It \
               computes these probabilities from the known distributions of durations, failures and \
               events, without knowledge of the future. If the world is too large for that, it \
-              compares alternatives in samples of the world at each event: to continue, to execute \
-              the remaining plan as `adaptable` or `esterel` does, to adopt another plan, and to \
-              wait.",
+              compares alternatives in samples of the world at each event: to continue, to hand the \
+              remaining plan over to an executor that repeats or skips actions, to adopt another \
+              plan, and to wait.",
     paper: "the policy of a semi-Markov decision process (Howard, 1971); without it, the rollout algorithm \
             (Bertsekas, Tsitsiklis & Wu, 1997); goes beyond both papers",
-    need: PlanForm::OpenNetwork,
+    needs: Needs {
+        odds: Need::Always,
+        action_values: true,
+        rollouts: true,
+        ..Needs::plan(PlanForm::OpenNetwork)
+    },
+    roles: &[],
     make: |_, mut means| {
         if means.action_values.is_none()
             && let Some(rehearsal) = means.rollout.take()
@@ -116,7 +122,7 @@ enum NextEvaluation {
 
 impl Executor for Policy {
     fn need(&self) -> PlanForm {
-        REGISTERED.need
+        REGISTERED.needs.plan
     }
 
     fn adopt(&mut self, mission: &PreparedPlan) -> Result<(), Box<Reason>> {

@@ -4,7 +4,7 @@ use elbowroom_num::Rational;
 use elbowroom_plan::uncertain::ConstraintRole;
 use elbowroom_plan::{Constraint, NodeId};
 
-use super::ExecutorEntry;
+use super::{ExecutorEntry, Needs};
 use crate::dispatch::{Dispatch, constant_bounds, replan};
 use crate::executor::PlanForm;
 use crate::executor::{Decided, DecisionContext, Executor, Planned, PreparedPlan, StepId};
@@ -18,7 +18,8 @@ pub(super) const REGISTERED: ExecutorEntry = ExecutorEntry {
     summary: "Dispatches on the whole network, with the durations that the domain allows, and \
               replans when something happens outside its window.",
     paper: "Dechter, Meiri & Pearl (1991); Muscettola, Morris & Tsamardinos (1998)",
-    need: PlanForm::Network,
+    needs: Needs::plan(PlanForm::Network),
+    roles: &[],
     make: |_, _| Box::new(Stn { state: None }),
 };
 
@@ -30,7 +31,7 @@ struct Stn {
 
 impl Executor for Stn {
     fn need(&self) -> PlanForm {
-        REGISTERED.need
+        REGISTERED.needs.plan
     }
 
     fn adopt(&mut self, mission: &PreparedPlan) -> Result<(), Box<Reason>> {

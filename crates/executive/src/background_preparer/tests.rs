@@ -43,7 +43,7 @@ fn background_preparation_equals_awaited_one() {
             executor,
             ..spec.clone()
         };
-        let need = spec.executor.registered.need;
+        let need = spec.executor.needs().plan;
         let (signal, zero, later) = (
             CompletionSignal::default(),
             Rational::ZERO,

@@ -15,11 +15,11 @@ use super::initial_plans::FirstPlanNote;
 use super::trials::{PLAN_CACHE_SIZE, PREPARED_CACHE_SIZE, Setting, believed_world, world};
 use super::{Column, ExperimentError, Planning};
 use elbowroom::execute::{
-    ActionSets, CachingPlanner, CachingPreparer, Choice, MostProbablePlanner, PlanPreparer,
-    PlanSelector, Replanning, RolloutPolicy, Rollouts, SharedMostProbablePlanner,
-    SharedRolloutPolicy, WorldKnowledge,
+    CachingPlanner, CachingPreparer, Choice, MostProbablePlanner, PlanPreparer, PlanSelector,
+    Replanning, RolloutPolicy, Rollouts, SharedMostProbablePlanner, SharedRolloutPolicy,
+    WorldKnowledge, action_values,
 };
-use elbowroom::mdp::{Policy, Settings};
+use elbowroom::mdp::Settings;
 
 /// Column for one problem.
 pub(super) struct Scenario {
@@ -66,37 +66,28 @@ impl Setting<'_> {
         let mut preparer = CachingPreparer::new(PlanPreparer::new(flow), PREPARED_CACHE_SIZE);
         for spec in &self.experiment.executors {
             preparer
-                .prepare(task, first, spec.registered.need)
+                .prepare(task, first, spec.needs().plan)
                 .map_err(|error| self.error(&error.to_string()))?;
         }
         let planning_time = match &self.experiment.settings.planning_time {
             PlanningTime::Seconds(seconds) => seconds.clone(),
             PlanningTime::Measured => Rational::ZERO,
         };
-        let asks_outlook = self
-            .experiment
-            .executors
-            .iter()
-            .any(ExecutorSpec::needs_action_values);
-        let outlook = asks_outlook.then(|| {
+        let mut executors = self.experiment.executors.iter();
+        let needs_action_values = executors.clone().any(|spec| spec.needs().action_values);
+        let needs_rollouts = executors.any(|spec| spec.needs().rollouts);
+        let outlook = needs_action_values.then(|| {
             let most_states = self.experiment.table_states;
-            let sets = if self.experiment.planner == Planning::Embedded && most_states > 0 {
-                ActionSets::for_policy(task, &world, self.embedded(), goes_on)
-            } else {
-                ActionSets::default()
-            };
+            let has_plans = self.experiment.planner == Planning::Embedded && most_states > 0;
             let settings = Settings {
                 most_states,
-                plans: sets.plans,
-                fallbacks: sets.fallbacks,
                 ..Settings::default()
             };
-            let policy = Policy::if_near_optimal(task, &world, &settings, goes_on);
-            let policy = policy.ok()??;
-            Some(Arc::new(policy) as Arc<dyn ActionValues>)
+            let planner = has_plans.then(|| self.embedded());
+            action_values(task, &world, planner, settings, goes_on).ok()
         });
         let outlook = outlook.flatten();
-        let rehearse = (asks_outlook && outlook.is_none()).then(|| {
+        let rehearse = (needs_rollouts && outlook.is_none()).then(|| {
             // The executor that uses rollouts is not simulated in them.
             let rollouts = self.rollouts(&ExecutorSpec::default(), column, (&world, &likelihoods));
             SharedRolloutPolicy::new(RolloutPolicy::new(rollouts, self.embedded()))
@@ -108,13 +99,13 @@ impl Setting<'_> {
         let mut beginnings = Vec::new();
         for (row, spec) in self.experiment.executors.iter().enumerate() {
             // An executor that uses rollouts also uses them to choose its first plan.
-            let tries_out = spec.needs_action_values() && rehearse.is_some();
+            let tries_out = spec.needs().rollouts && rehearse.is_some();
             let is_given = self.experiment.plan.is_some();
             let chooses = !is_given && (tries_out || !self.experiment.first_plan.is_shortest());
             let known = (&**task, &world, &likelihoods);
             let chosen = chooses.then(|| self.chosen_plan(spec, column, known, goes_on));
             let chosen = chosen.flatten();
-            let likely = (!is_given && chosen.is_none() && spec.needs_action_values()).then(|| {
+            let likely = (!is_given && chosen.is_none() && spec.needs().action_values).then(|| {
                 let answer = likeliest.plan(task, &Situation::initial(task)).answer;
                 match answer {
                     PlanAnswer::Plan(plan) => Some(plan),

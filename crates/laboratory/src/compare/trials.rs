@@ -324,9 +324,7 @@ impl Setting<'_> {
             first_plans: firsts,
             first_plan_notes: _,
         } = &mut common.columns[column];
-        let asks_odds = spec.needs_comparator();
-        let odds = asks_odds.then(|| Box::new(odds.clone()) as _);
-        let planner: &mut dyn Planner = if asks_odds {
+        let planner: &mut dyn Planner = if spec.needs_odds() {
             likeliest
         } else {
             &mut common.planner
@@ -337,9 +335,9 @@ impl Setting<'_> {
             .with_settings(settings.clone())
             .with_likelihoods(Arc::clone(likelihoods))
             .with_foresight(foresight.clone())
-            .with_plan_comparator(odds)
-            .with_action_values(outlook.clone().filter(|_| spec.needs_action_values()))
-            .with_rollouts(rehearse.clone().filter(|_| spec.needs_action_values()))
+            .with_plan_comparator(Some(Box::new(odds.clone())))
+            .with_action_values(outlook.clone())
+            .with_rollouts(rehearse.clone())
             .with_planner(planner)
             .with_preparer(preparer);
         // Explanations of missing plans are only read for single runs.

@@ -14,7 +14,23 @@ use elbowroom_probability::{
     TotalOrderPlan,
 };
 
-use super::{InstrumentedWorld, UntimedExecutor, start_of};
+use super::{ExecutorEntry, InstrumentedWorld, UntimedExecutor, start_of};
+
+pub(super) const REGISTERED: ExecutorEntry = ExecutorEntry {
+    name: "adaptable",
+    summary: "The paper's PGen and PExec. Running actions are ended before a plan is \
+              abandoned. In a dead end, where there is no other plan, it takes the \
+              most promising actions of its plan and relies on spontaneous changes.",
+    paper: "Olisipo in Ribeiro et al. (2021), sections 2.2.1 and 2.2.2",
+    construct: |means| {
+        let (task, likelihoods) = means.task_and_likelihoods();
+        Ok(Box::new(Adaptable::new(
+            task,
+            likelihoods,
+            Semantics::Paper,
+        )))
+    },
+};
 
 /// Olisipo's executor. After every step, it continues with the happening after the lattermost layer
 /// that fits. If no layer fits, it searches for the order most likely to succeed from the current

@@ -7,7 +7,15 @@ use elbowroom_model::{Situation, State, Step, Task, TimeTriggeredPlan};
 use elbowroom_plan::deorder::deorder;
 use elbowroom_plan::{Bound, Instance, Node, StnPlan};
 
-use super::{InstrumentedWorld, UntimedExecutor, start_of};
+use super::{ExecutorEntry, InstrumentedWorld, UntimedExecutor, start_of};
+
+pub(super) const REGISTERED: ExecutorEntry = ExecutorEntry {
+    name: "esterel",
+    summary: "The baseline: happenings as soon as the network allows, failed starts \
+              repeated without limit, a new plan when a condition is false.",
+    paper: "the Esterel Dispatcher of ROSPlan, in Ribeiro et al. (2021), section 3",
+    construct: |means| Ok(Box::new(Esterel::new(Arc::clone(&means.task)))),
+};
 
 /// Executes the deordered plan like `ROSPlan`'s Esterel dispatcher, node by node.
 ///

@@ -11,7 +11,16 @@ use elbowroom_probability::optimum::{Move, Optimum, Perturbed, Settings, Tabulat
 use elbowroom_probability::{Likelihoods, Model, Semantics};
 
 use super::adaptable::{circumstances, execute_happening};
-use super::{ActionName, InstrumentedWorld, UntimedExecutor};
+use super::{ActionName, ExecutorEntry, InstrumentedWorld, UntimedExecutor};
+
+pub(super) const REGISTERED: ExecutorEntry = ExecutorEntry {
+    name: "lookahead",
+    summary: "The optimal policy in the sound world (`docs/probability.md`), \
+              regardless of the plan. It is exact if at most `most_running` actions \
+              run at once.",
+    paper: "goes beyond Ribeiro et al. (2021)",
+    construct: |means| Ok(Box::new((means.foresight)()?)),
+};
 
 /// Optimal policy in the world of the likelihoods, independent of the plan: `lookahead` without a
 /// clock.

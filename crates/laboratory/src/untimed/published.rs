@@ -11,7 +11,19 @@ use elbowroom_probability::{
 };
 
 use super::adaptable::{circumstances, execute_happening, model};
-use super::{InstrumentedWorld, UntimedExecutor, apply, holds, start_of};
+use super::{ExecutorEntry, InstrumentedWorld, UntimedExecutor, apply, holds, start_of};
+
+pub(super) const REGISTERED: ExecutorEntry = ExecutorEntry {
+    name: "as-published",
+    summary: "The authors' program: the last order found instead of the best, and no second \
+              search. When its order no longer fits, it stops (the authors' program executed a \
+              few more actions, without effect).",
+    paper: "the program behind the results of Ribeiro et al. (2021)",
+    construct: |means| {
+        let (task, likelihoods) = means.task_and_likelihoods();
+        Ok(Box::new(PublishedExecutor::new(task, likelihoods)))
+    },
+};
 
 /// The published program, with the faults on which its results depend:
 ///

@@ -1,5 +1,5 @@
 //! Registry of the executors without time. To add an executor, write a file with its
-//! [`UntimedExecutor`] and an entry in [`EXECUTORS`].
+//! [`UntimedExecutor`] and its [`ExecutorEntry`], and add a line to [`EXECUTORS`].
 
 use std::fmt;
 use std::str::FromStr;
@@ -7,12 +7,12 @@ use std::sync::Arc;
 
 use elbowroom_execution::executors;
 use elbowroom_model::Task;
-use elbowroom_probability::{Likelihoods, Semantics};
+use elbowroom_probability::Likelihoods;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::{
-    Adaptable, Esterel, LookaheadPolicy, NotTabulated, PublishedExecutor, UntimedExecutor,
+    LookaheadPolicy, NotTabulated, UntimedExecutor, adaptable, esterel, lookahead, published,
 };
 
 /// Registry entry of an executor: name, documentation and constructor.
@@ -26,7 +26,8 @@ pub struct ExecutorEntry {
     /// Its source.
     pub paper: &'static str,
     /// Constructor.
-    construct: fn(&ExecutorServices<'_>) -> Result<Box<dyn UntimedExecutor>, NotTabulated>,
+    pub(super) construct:
+        fn(&ExecutorServices<'_>) -> Result<Box<dyn UntimedExecutor>, NotTabulated>,
 }
 
 /// Services for the construction of an executor.
@@ -41,51 +42,15 @@ pub struct ExecutorServices<'m> {
 
 /// All executors, in the order of the results.
 pub const EXECUTORS: &[ExecutorEntry] = &[
-    ExecutorEntry {
-        name: "esterel",
-        summary: "The baseline: happenings as soon as the network allows, failed starts \
-                  repeated without limit, a new plan when a condition is false.",
-        paper: "the Esterel Dispatcher of ROSPlan, in Ribeiro et al. (2021), section 3",
-        construct: |means| Ok(Box::new(Esterel::new(Arc::clone(&means.task)))),
-    },
-    ExecutorEntry {
-        name: "adaptable",
-        summary: "The paper's PGen and PExec. Running actions are ended before a plan is \
-                  abandoned. In a dead end, where there is no other plan, it takes the \
-                  most promising actions of its plan and relies on spontaneous changes.",
-        paper: "Olisipo in Ribeiro et al. (2021), sections 2.2.1 and 2.2.2",
-        construct: |means| {
-            let (task, likelihoods) = means.task_and_likelihoods();
-            Ok(Box::new(Adaptable::new(
-                task,
-                likelihoods,
-                Semantics::Paper,
-            )))
-        },
-    },
-    ExecutorEntry {
-        name: "as-published",
-        summary: "The authors' program: the last order found instead of the best, and no second \
-                  search. When its order no longer fits, it stops (the authors' program executed a \
-                  few more actions, without effect).",
-        paper: "the program behind the results of Ribeiro et al. (2021)",
-        construct: |means| {
-            let (task, likelihoods) = means.task_and_likelihoods();
-            Ok(Box::new(PublishedExecutor::new(task, likelihoods)))
-        },
-    },
-    ExecutorEntry {
-        name: "lookahead",
-        summary: "The optimal policy in the sound world (`docs/probability.md`), \
-                  regardless of the plan. It is exact if at most `most_running` actions \
-                  run at once.",
-        paper: "goes beyond Ribeiro et al. (2021)",
-        construct: |means| Ok(Box::new((means.foresight)()?)),
-    },
+    esterel::REGISTERED,
+    adaptable::REGISTERED,
+    published::REGISTERED,
+    lookahead::REGISTERED,
 ];
 
 impl ExecutorServices<'_> {
-    fn task_and_likelihoods(&self) -> (Arc<Task>, Arc<Likelihoods>) {
+    /// Returns the task and its likelihoods.
+    pub(super) fn task_and_likelihoods(&self) -> (Arc<Task>, Arc<Likelihoods>) {
         (Arc::clone(&self.task), Arc::clone(&self.likelihoods))
     }
 }

@@ -1,5 +1,6 @@
 //! Guarantee over the time of a run, with the reasons for its changes.
 
+use elbowroom::execution::GuaranteeLevel;
 use elbowroom::report::decimal::nearest;
 use elbowroom::report::schema::{DecisionLine, ObservationLine, WindowLine};
 use elbowroom::report::trace::Line;
@@ -107,21 +108,22 @@ impl Guarantees {
 
 /// Returns the level and the meaning of a guarantee.
 fn level_and_meaning(promise: &str) -> (i8, &'static str) {
-    match promise {
-        "envelope" => (
+    let mut known = GuaranteeLevel::TERMS.iter();
+    match known.find(|(_, name, _)| *name == promise) {
+        Some((GuaranteeLevel::Envelope, ..)) => (
             3,
             "works for all values inside the envelope, unless an action times out",
         ),
-        "part-of-envelope" => (
+        Some((GuaranteeLevel::PartOfEnvelope, ..)) => (
             2,
             "works for all values inside a part of the envelope, unless an action times out",
         ),
-        "planned" => (
+        Some((GuaranteeLevel::Planned, ..)) => (
             1,
             "no guarantee, feasible at nominal durations: works if each action still to start takes as long as planned",
         ),
-        "luck" => (0, "no guarantee, may still work"),
-        _ => (-1, "none"),
+        Some((GuaranteeLevel::Luck, ..)) => (0, "no guarantee, may still work"),
+        None => (-1, "none"),
     }
 }
 

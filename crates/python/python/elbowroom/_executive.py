@@ -56,7 +56,7 @@ class Executive(BackgroundRun):
         world: World | AsyncWorld | SteppedWorld | Text | None = None,
         journal: str | os.PathLike[str] | None = None,
         learn: str | os.PathLike[str] | None = None,
-        executor: str = "live",
+        executor: str = _native.DEFAULT_EXECUTOR,
         planner: str = "embedded",
         seed: int = 0,
         epsilon: Number = "0.001",

@@ -344,7 +344,8 @@ class Problem(Executable):
             best: ``True`` for the likeliest order instead of that of the plan's times.
             semantics: the result of a failed effect: the opposite value (``"paper"``), or the unchanged
                 fact (``"world"``).
-            executors: the executors that execute the plan in the samples; ``live`` and ``adaptable`` by default.
+            executors: the executors that execute the plan in the samples; by default those that
+                ``elbowroom odds --help`` names.
             samples: the number of samples.
             seed: the random seed of the first sample; the others follow.
             most_sequences: the maximum number of partial orders in the search for the likeliest order.

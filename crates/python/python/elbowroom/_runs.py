@@ -132,7 +132,7 @@ class RunRequest:
         plan: tuple[str, str] | None,
         *,
         world: Any = None,
-        executor: str = "live",
+        executor: str = _native.DEFAULT_EXECUTOR,
         planner: str | PlannerCallable = "embedded",
         seed: int = 0,
         trace: bool = True,

@@ -15,10 +15,10 @@ use crate::deadline::run_with_deadline;
 use crate::exit::{Answer, Exit, Failure};
 use crate::input;
 use crate::interrupt::Interrupt;
-use crate::limits::push_wrapped;
 use crate::output::{self, Output};
-use crate::terminal::{ERROR, HINT, SECONDARY, SUCCESS, TextLayout, styled};
+use crate::terminal::{ERROR, HINT, SECONDARY, SUCCESS, TextLayout, stdout_layout, styled};
 use crate::time_limit::{Stopwatch, duration};
+use elbowroom::report::console::push_wrapped;
 use elbowroom_executive::messages::count_with_noun;
 
 /// Maximum number of reasons printed for an inequality; `--json` has all.
@@ -63,7 +63,7 @@ pub(super) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
     if arguments.json {
         output.document(&outcome.answer)?;
     } else {
-        output::print(&text(&outcome, TextLayout::of_stdout()))?;
+        output::print(&text(&outcome, stdout_layout()))?;
         if matches!(outcome.answer.finding, RegionFinding::Invalid { .. }) {
             input::advise_repair();
         }

@@ -17,10 +17,10 @@ use crate::deadline::run_with_deadline;
 use crate::exit::{Answer, Exit, Failure};
 use crate::input;
 use crate::interrupt::Interrupt;
-use crate::limits::push_wrapped;
 use crate::output::{self, Output};
-use crate::terminal::{EMPHASIS, ERROR, HINT, SUCCESS, TextLayout, styled};
+use crate::terminal::{EMPHASIS, ERROR, HINT, SUCCESS, TextLayout, stdout_layout, styled};
 use crate::time_limit::{Stopwatch, duration};
+use elbowroom::report::console::push_wrapped;
 
 /// Number of digits printed; `--json` has exact numbers.
 const DIGITS: u32 = 6;
@@ -44,9 +44,7 @@ pub(super) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
         name: arguments.plan.display().to_string(),
         change: read("--change", &arguments.change)?,
         keep: read("--keep", &arguments.keep)?,
-        guarantee: arguments
-            .guarantee
-            .map_or_else(Default::default, Into::into),
+        guarantee: arguments.guarantee.unwrap_or_default(),
         ..RepairRequest::new(
             &Arc::new(task.clone()),
             input::any_plan(&task, &arguments.plan, &arguments.rounding(), output)?,
@@ -63,7 +61,7 @@ pub(super) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
     if arguments.json {
         output.document(&outcome.answer)?;
     } else {
-        output::print(&text(&outcome, &request.plan, TextLayout::of_stdout()))?;
+        output::print(&text(&outcome, &request.plan, stdout_layout()))?;
     }
     Ok(match &outcome.answer.finding {
         RepairFinding::Repaired { .. } => Exit::Yes,

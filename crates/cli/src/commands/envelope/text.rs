@@ -15,11 +15,12 @@ use elbowroom::answers::envelope::{
 use elbowroom::num::Rational;
 
 use crate::args::Order;
-use crate::limits::{self, push_paragraph, push_wrapped};
+use crate::limits::{self};
 use crate::number::{self, Rounding};
-use crate::table::{self, Row};
 use crate::terminal::{EMPHASIS, ERROR, SECONDARY, SUCCESS, TextLayout, styled};
 use best::{best_relaxations, objective_text};
+use elbowroom::report::console::tolerance_table::{self as table, Row};
+use elbowroom::report::console::{push_paragraph, push_wrapped};
 use elbowroom_executive::messages::count_with_noun;
 use example::{example, reason_text};
 

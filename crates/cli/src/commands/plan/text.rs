@@ -11,7 +11,7 @@ use crate::args::EMBEDDED;
 use crate::exit::Failure;
 use crate::number;
 use crate::terminal::{HINT, SECONDARY, TextLayout, styled};
-use crate::wrap::wrap;
+use elbowroom::report::console::wrap;
 use elbowroom_executive::messages::count_with_noun;
 
 /// Renders the plan as text. If its metric differs from its makespan, a comment at the end states

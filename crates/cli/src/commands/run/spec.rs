@@ -45,7 +45,7 @@ pub(in crate::commands) fn of(
         improve_states: arguments.improve_states,
         self_overlap: arguments.self_overlap,
         threads: threads_of(arguments, &arguments.planner)?,
-        guarantee: arguments.guarantee.into(),
+        guarantee: arguments.guarantee,
         precision: arguments.precision.clone(),
         objective: arguments.objective()?,
         running: match arguments.running {

@@ -7,8 +7,8 @@ use elbowroom::execution::Ending;
 use elbowroom::execution::run::{Report, Verdict};
 
 use crate::number::nearest;
-use crate::terminal::{EMPHASIS, ERROR, HINT, SUCCESS, TextLayout, styled};
-use crate::wrap::wrap;
+use crate::terminal::{EMPHASIS, ERROR, HINT, SUCCESS, stdout_layout, styled};
+use elbowroom::report::console::wrap;
 use elbowroom_executive::messages::{count_with_noun, escape_control};
 
 /// Circumstances of the end of a run.
@@ -27,7 +27,7 @@ pub(super) fn render(answer: &RunAnswer, report: &Report, ends: RunEnd) -> Strin
         replans.push_str(" since it was last idle");
     }
     let time = nearest(&report.time);
-    let width = TextLayout::of_stdout().width;
+    let width = stdout_layout().width;
     let mut text = match &report.verdict {
         Verdict::GoalReached => {
             format!(

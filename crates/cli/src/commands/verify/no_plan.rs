@@ -10,10 +10,10 @@ use serde_json::{Value, json};
 use crate::args::{ProblemArgs, VerifyArgs};
 use crate::exit::{Answer, Exit, Failure};
 use crate::input;
-use crate::limits::push_wrapped;
 use crate::number::nearest;
 use crate::output::{self, Output};
-use crate::terminal::{ERROR, SUCCESS, TextLayout, styled};
+use crate::terminal::{ERROR, SUCCESS, stdout_layout, styled};
+use elbowroom::report::console::push_wrapped;
 use elbowroom_executive::messages::count_with_noun;
 
 /// Returns `true` if the text is an answer of `elbowroom plan`.
@@ -90,7 +90,7 @@ pub(super) fn run(arguments: &VerifyArgs, source: &Source, output: &mut Output) 
             }
             Err(flaw) => format!("{flaw}."),
         };
-        push_wrapped(&mut text, &sentence, 2, TextLayout::of_stdout().width);
+        push_wrapped(&mut text, &sentence, 2, stdout_layout().width);
         output::print(&text)?;
     }
     Ok(if verdict.is_ok() { Exit::Yes } else { Exit::No })

@@ -4,15 +4,21 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use elbowroom_execution::executors::ExecutorSpec;
-use elbowroom_execution::run::{Report, Verdict};
-use elbowroom_execution::{NoPlanner, Planner};
+use elbowroom_execution::run::{Report, RunSettings, Verdict};
+use elbowroom_execution::{ActionValues, NoPlanner, PlanComparator, Planner};
+use elbowroom_mdp::Settings;
+use elbowroom_num::{Rational, work};
 use elbowroom_report::statistics::Proportion;
 use elbowroom_sim::WorldModel;
 use serde::{Deserialize, Serialize};
 
 use super::{Subject, planner};
 use crate::answers::Observer;
-use crate::execute::{CachingPlanner, CachingPreparer, Execution, PlanPreparer};
+use crate::execute::{
+    CachingPlanner, CachingPreparer, Embedded, Execution, MostProbablePlanner, PLANNING_BUDGET,
+    PlanPreparer, Replanning, RolloutPolicy, Rollouts, SharedMostProbablePlanner,
+    SharedRolloutPolicy, action_values, planning_work,
+};
 use crate::pipeline;
 
 /// Maximum number of cached plans.
@@ -71,10 +77,11 @@ fn execute_with(
     watcher: &mut dyn Observer,
 ) -> ExecutedAnswer {
     let request = subject.request;
-    let mut planner: Box<dyn Planner> = if replans {
-        Box::new(CachingPlanner::new(planner(&request.settings), CACHE_SIZE))
-    } else {
-        Box::new(NoPlanner)
+    let services = Services::new(subject, world, executor);
+    let mut planner: Box<dyn Planner> = match (&services.comparator, replans) {
+        (_, false) => Box::new(NoPlanner),
+        (Some(comparator), true) => Box::new(CachingPlanner::new(comparator.clone(), CACHE_SIZE)),
+        (None, true) => Box::new(CachingPlanner::new(planner(&request.settings), CACHE_SIZE)),
     };
     let analyst = PlanPreparer::new(pipeline::Settings::default());
     let mut preparer = CachingPreparer::new(analyst, CACHE_SIZE);
@@ -91,6 +98,9 @@ fn execute_with(
             .by(executor.clone())
             .beginning_with(subject.plan.clone())
             .with_likelihoods(Arc::clone(request.likelihoods))
+            .with_plan_comparator(services.comparator())
+            .with_action_values(services.action_values.clone())
+            .with_rollouts(services.rollouts.clone())
             .with_planner(&mut *planner)
             .with_preparer(&mut preparer)
             .run_in(&mut *world.world(&task, seed));
@@ -118,6 +128,62 @@ fn execute_with(
         reached: reached.successes,
         interval: reached.wilson(),
         ends,
+    }
+}
+
+/// Services for the executor, computed from the world of the samples.
+struct Services {
+    comparator: Option<SharedMostProbablePlanner>,
+    action_values: Option<Arc<dyn ActionValues>>,
+    rollouts: Option<SharedRolloutPolicy>,
+}
+
+impl Services {
+    fn new(subject: &Subject<'_>, world: &WorldModel, executor: &ExecutorSpec) -> Self {
+        let request = subject.request;
+        let planner = || Embedded {
+            work: planning_work(&Rational::from(PLANNING_BUDGET)),
+            ..planner(&request.settings)
+        };
+        let action_values = executor.needs().action_values.then(|| {
+            let budget = work::Budget::new(planner().work);
+            let goes_on = || !budget.is_spent();
+            action_values(
+                request.task,
+                world,
+                Some(planner()),
+                Settings::default(),
+                &goes_on,
+            )
+            .ok()
+        });
+        let action_values = action_values.flatten();
+        let rollouts = (executor.needs().rollouts && action_values.is_none()).then(|| {
+            let rollouts = Rollouts {
+                world: Arc::new(world.clone()),
+                executor: ExecutorSpec::default(),
+                settings: RunSettings::default(),
+                flow: pipeline::Settings::default(),
+                likelihoods: Arc::clone(request.likelihoods),
+                replanning: Some(Replanning::within(&planner())),
+                is_ready: true,
+            };
+            SharedRolloutPolicy::new(RolloutPolicy::new(rollouts, planner()))
+        });
+        let comparator = executor.needs_odds().then(|| {
+            let planner = MostProbablePlanner::new(world.clone(), planner(), Rational::ZERO);
+            SharedMostProbablePlanner::new(planner)
+        });
+        Self {
+            comparator,
+            action_values,
+            rollouts,
+        }
+    }
+
+    fn comparator(&self) -> Option<Box<dyn PlanComparator>> {
+        let comparator = self.comparator.clone()?;
+        Some(Box::new(comparator))
     }
 }
 

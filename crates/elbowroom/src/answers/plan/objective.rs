@@ -8,7 +8,7 @@ use std::str::FromStr;
 use std::sync::Arc;
 
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
-use elbowroom_num::Rational;
+use elbowroom_num::{Rational, terms};
 use elbowroom_plan::makespan::last_end;
 use elbowroom_planner::{Answer, Settings};
 use elbowroom_sim::WorldModel;
@@ -20,17 +20,17 @@ use crate::execute::{Candidates, Limits};
 use crate::pipeline;
 use evaluation::{EvaluatedPlan, PlanEvaluator};
 
-/// Objective of a plan other than its makespan or metric.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum PlanObjective {
-    /// The slack: the relative deviation from its nominal value that each duration may have, all at
-    /// the same time, in the plan's best box ([`elbowroom_envelope::Objective::LeastSlack`]).
-    /// Documents in JSON call it `room`.
-    #[serde(rename = "room", alias = "slack")]
-    Slack,
-    /// The success probability in a world, with the executor `live` and without replanning.
-    Probability,
+terms! {
+    /// Objective of a plan other than its makespan or metric. The deviation is that of all durations at the same time,
+    /// in the plan's best box ([`elbowroom_envelope::Objective::LeastSlack`]); documents in JSON call it `room`. Plans
+    /// are executed in the world with the default executor and without replanning.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+    #[serde(rename_all = "lowercase")]
+    pub enum PlanObjective {
+        #[serde(rename = "room", alias = "slack")]
+        Slack = "slack": "The relative deviation that all its durations may have",
+        Probability = "probability": "Share of successes in a world",
+    }
 }
 
 /// The name of an unknown [`PlanObjective`].
@@ -40,10 +40,7 @@ pub struct UnknownPlanObjective(String);
 
 impl fmt::Display for PlanObjective {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Slack => "slack",
-            Self::Probability => "probability",
-        })
+        f.write_str(self.name())
     }
 }
 
@@ -51,9 +48,9 @@ impl FromStr for PlanObjective {
     type Err = UnknownPlanObjective;
 
     fn from_str(name: &str) -> Result<Self, UnknownPlanObjective> {
-        let all = [Self::Slack, Self::Probability];
         let name = if name == "room" { "slack" } else { name };
-        let known = all.into_iter().find(|known| known.to_string() == name);
+        let known = Self::TERMS.iter().find(|(_, known, _)| *known == name);
+        let known = known.map(|(objective, ..)| *objective);
         known.ok_or_else(|| UnknownPlanObjective(name.to_owned()))
     }
 }

@@ -10,22 +10,22 @@ use elbowroom_execution::{
     ActionValues, NoPlanner, PlanComparator, PlanForm, Planner, PrepareError, Preparer, World,
 };
 use elbowroom_external::{self as external, PlannerError};
-use elbowroom_mdp::{Policy, Settings};
+use elbowroom_mdp::Settings;
 use elbowroom_model::problem::Problem;
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::{Rational, work};
 use elbowroom_planner::embedded;
 use elbowroom_probability::Likelihoods;
 use elbowroom_selection::timeouts::unknown_action;
-use elbowroom_selection::{CERTIFICATE_WORK, certificate_work};
+use elbowroom_selection::{CERTIFICATE_WORK, action_values, certificate_work};
 use elbowroom_sim::{ControlledWorld, SimWorld, WorldModel};
 use elbowroom_text::Diagnostics;
 
 use super::{EMBEDDED, NO_PLANNER, RunSpec};
 use crate::execute::{
-    ActionSets, AdversarialWorld, Embedded, Execution, External, FirstPlan, MostProbablePlanner,
-    PlanPreparer, PlanSelector, Replanning, RolloutPolicy, Rollouts, SelectingPlanner,
-    SharedRolloutPolicy, WorldKnowledge, planning_work,
+    AdversarialWorld, Embedded, Execution, External, FirstPlan, MostProbablePlanner, PlanPreparer,
+    PlanSelector, Replanning, RolloutPolicy, Rollouts, SelectingPlanner, SharedRolloutPolicy,
+    WorldKnowledge, planning_work,
 };
 use crate::{BoxTextError, DistributionError, parse_box, pipeline};
 
@@ -179,7 +179,7 @@ impl RunSpec {
         };
         let planner: Box<dyn Planner + 'a> = match self.planner_choice()? {
             PlannerChoice::Disabled => return Ok(Box::new(NoPlanner)),
-            PlannerChoice::Embedded => match model.filter(|_| self.executor.needs_comparator()) {
+            PlannerChoice::Embedded => match model.filter(|_| self.executor.needs_odds()) {
                 None => Box::new(embedded),
                 Some(model) => {
                     let time = self.expected_planning_time();
@@ -245,7 +245,7 @@ impl RunSpec {
             .likelihoods
             .is_some()
             .then(|| WorldKnowledge::Likelihoods {
-                reorders: self.executor.chooses_order(),
+                reorders: self.executor.needs().orders,
                 likelihoods,
             }))
     }
@@ -273,7 +273,7 @@ impl RunSpec {
         task: &Task,
         model: Option<&WorldModel>,
     ) -> Result<Option<SharedRolloutPolicy>, SpecError> {
-        if self.believed_world().is_none() || !self.executor.needs_action_values() {
+        if self.believed_world().is_none() || !self.executor.needs().rollouts {
             return Ok(None);
         }
         let Some(world) = model else {
@@ -354,8 +354,7 @@ impl RunSpec {
         if self.objective == Some(Objective::Probability) && self.believed_world().is_none() {
             return Err(SpecError::Distribution(DistributionError::NoWorld));
         }
-        // Executors that evaluate moves follow the plan if there is no model.
-        if !self.executor.needs_comparator() || self.executor.needs_action_values() {
+        if !self.executor.requires_world_model() {
             return Ok(());
         }
         if self.believed_world().is_none() && self.spoiler.is_none() {
@@ -382,7 +381,7 @@ impl RunSpec {
                 .as_ref()
                 .map_or(u64::MAX, planning_work),
             // Requests have to wait for plans that are made in the thread of the run.
-            first_plan_factor: if self.is_persistent && self.executor.needs_comparator() {
+            first_plan_factor: if self.is_persistent && self.executor.needs_odds() {
                 1
             } else {
                 Embedded::default().first_plan_factor
@@ -437,10 +436,10 @@ impl RunSpec {
         }
         let model = self.beliefs(task.problem()).map_err(SpecError::World)?;
         let envelopes = self.envelopes_in(model.as_ref());
-        let model = model.filter(|_| self.executor.needs_comparator());
+        let model = model.filter(|_| self.executor.uses_world_model());
         let is_embedded = matches!(self.planner_choice()?, PlannerChoice::Embedded);
         // A table of moves has a fixed goal.
-        let has_table = self.executor.needs_action_values() && !self.is_persistent;
+        let has_table = self.executor.needs().action_values && !self.is_persistent;
         let tabulated = model.as_ref().filter(|_| has_table);
         let tabulated = tabulated.map(|model| self.action_values(task, model, is_embedded));
         let (outlook, no_table) = match tabulated.transpose() {
@@ -452,7 +451,7 @@ impl RunSpec {
             Some(_) => None,
             None => self.rollout_policy(task, model.as_ref())?,
         };
-        let odds = model.map(|model| {
+        let odds = model.filter(|_| self.executor.needs_odds()).map(|model| {
             let time = self.expected_planning_time();
             Box::new(MostProbablePlanner::new(model, self.embedded(), time))
                 as Box<dyn PlanComparator>
@@ -470,7 +469,7 @@ impl RunSpec {
             .with_rollouts(rehearsal))
     }
 
-    /// Computes the table of moves of `policy` for the world of `model`.
+    /// Computes the table of moves for the world of `model`.
     ///
     /// # Errors
     /// The reason for a missing table, for users.
@@ -483,26 +482,8 @@ impl RunSpec {
         let embedded = self.embedded();
         let budget = work::Budget::new(embedded.work);
         let goes_on = || !budget.is_spent();
-        let sets = if is_embedded {
-            ActionSets::for_policy(task, model, embedded, &goes_on)
-        } else {
-            ActionSets::default()
-        };
-        let settings = Settings {
-            plans: sets.plans,
-            fallbacks: sets.fallbacks,
-            ..Settings::default()
-        };
-        let policy = Policy::if_near_optimal(task, model, &settings, &goes_on);
-        match policy.map_err(|error| error.what)? {
-            Some(policy) => Ok(Arc::new(policy)),
-            None if goes_on() => Err(
-                "it would have too many states, or its bounds would stay more than 2 percentage \
-                 points apart"
-                    .to_owned(),
-            ),
-            None => Err("the planning budget is spent (`--planning-budget`)".to_owned()),
-        }
+        let planner = is_embedded.then_some(embedded);
+        action_values(task, model, planner, Settings::default(), &goes_on)
     }
 }
 

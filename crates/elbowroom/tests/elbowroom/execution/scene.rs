@@ -143,7 +143,7 @@ impl Scene {
         let spec: ExecutorSpec = executor.parse().expect("a correct test");
         let mut analyst = PlanPreparer::new(self.flow.clone());
         analyst
-            .prepare(&self.task, &self.plan, spec.registered.need)
+            .prepare(&self.task, &self.plan, spec.needs().plan)
             .expect("a correct test")
     }
 

@@ -253,7 +253,7 @@ impl Running {
     /// The command cannot be started. The text says why.
     pub(super) fn start(
         elbowroom: &str,
-        executor: &str,
+        executor: Option<&str>,
         texts: &PlanRequest,
         plan: &str,
         inputs: &Sender<Input>,
@@ -271,13 +271,8 @@ impl Running {
         std::os::unix::fs::symlink(&own, &relay).map_err(|e| unusable(&relay, &e))?;
         let mut child = Command::new(elbowroom)
             .arg("run")
-            .args([
-                "domain.pddl",
-                "problem.pddl",
-                "plan.plan",
-                "--executor",
-                executor,
-            ])
+            .args(["domain.pddl", "problem.pddl", "plan.plan"])
+            .args(executor.into_iter().flat_map(|name| ["--executor", name]))
             .args(["--world-process", "./relay relay world"])
             .current_dir(folder.path())
             .stdin(Stdio::null())

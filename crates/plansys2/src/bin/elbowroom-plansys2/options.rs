@@ -56,9 +56,9 @@ pub(super) struct ServeOptions {
     /// The command that plans and executes
     #[arg(long, value_name = "COMMAND", default_value = "elbowroom")]
     pub(super) elbowroom: String,
-    /// The executor, see `elbowroom run --help`
-    #[arg(long, value_name = "NAME", default_value = "live")]
-    pub(super) executor: String,
+    /// The executor, see `elbowroom run --help`; the default is that of the command
+    #[arg(long, value_name = "NAME")]
+    pub(super) executor: Option<String>,
     /// Time limit for planning, in seconds
     #[arg(long, value_name = "S", default_value = "60")]
     plan_within: f64,
@@ -68,7 +68,7 @@ pub(super) struct ServeOptions {
 #[derive(Debug)]
 pub(super) struct ServeSettings {
     pub(super) elbowroom: String,
-    pub(super) executor: String,
+    pub(super) executor: Option<String>,
     pub(super) plan_within: Duration,
 }
 

@@ -342,7 +342,7 @@ impl Server {
             executor,
             ..
         } = &self.settings;
-        let run = Running::start(elbowroom, executor, texts, &text, &self.inputs)?;
+        let run = Running::start(elbowroom, executor.as_deref(), texts, &text, &self.inputs)?;
         let problem = texts.problem.clone();
         if !self.goals.accept(request.goal_id, stamp) {
             run.interrupt();

@@ -6,9 +6,9 @@ use elbowroom::model::Task;
 use elbowroom::plan::ParametrizedPlan;
 use elbowroom::{Explanation, Shortfall, pddl};
 
-use crate::limits::push_wrapped;
 use crate::number;
 use crate::terminal::{EMPHASIS, TextLayout, styled};
+use elbowroom::report::console::push_wrapped;
 
 /// Describes the reason, and the amount of the violation.
 pub(super) fn reason_text(explanation: &Explanation) -> String {

@@ -8,7 +8,7 @@ use elbowroom::execution::run::TimeoutRule;
 use elbowroom::num::Rational;
 
 use crate::number;
-use crate::table::{self, Row};
+use elbowroom::report::console::tolerance_table::{self as table, Row};
 use elbowroom_executive::messages::count_with_noun;
 
 /// Describes the guarantee.

@@ -111,9 +111,7 @@ impl PlanEvaluator<'_> {
             PlanAim::Probability(world) => {
                 let rollouts = Rollouts {
                     world: Arc::new(world.clone()),
-                    executor: "live"
-                        .parse::<ExecutorSpec>()
-                        .unwrap_or_else(|_| ExecutorSpec::default()),
+                    executor: ExecutorSpec::default(),
                     settings: RunSettings::default(),
                     flow: pipeline::Settings::default(),
                     likelihoods: Arc::new(Likelihoods::certain()),

@@ -9,8 +9,8 @@ use elbowroom::num::Rational;
 use super::protocol_driver::{ProtocolDriver, WorldLost};
 use super::table::{Check, Findings};
 use super::{advance_until, longest, wait_for_starts};
-use elbowroom_executive::messages::excerpt;
-use elbowroom_executive::world_protocol::{Capability, launch};
+use crate::messages::excerpt;
+use crate::world_protocol::{Capability, launch};
 
 /// Ticket of a start that has ended before the world is killed. `RUNNING_TICKET` is running then, and
 /// `UNKNOWN_TICKET` was never sent to the world.

@@ -2,15 +2,15 @@
 
 use std::fmt::Write as _;
 
-use elbowroom::answers::odds::{
+use super::{
     BestOrderAnswer, ExecutedAnswer, LossAnswer, LossReason, Odds, OddsAnswer, OddsFinding,
     OrderAnswer, ValueAnswer,
 };
-use elbowroom::report::table::Table;
+use elbowroom_report::table::Table;
 
-use crate::limits::push_paragraph;
-use crate::terminal::{EMPHASIS, ERROR, HINT, TextLayout, styled};
-use elbowroom_executive::messages::count_with_noun;
+use elbowroom_report::console::{
+    EMPHASIS, ERROR, HINT, TextLayout, count_with_noun, push_paragraph, styled,
+};
 
 /// Maximum number of losses, or of possible gains, that are listed.
 const MOST_ROWS: usize = 12;
@@ -18,7 +18,14 @@ const MOST_ROWS: usize = 12;
 /// Minimum share that is listed.
 const NEGLIGIBLE: f64 = 0.000_05;
 
-pub(super) fn render(answer: &OddsAnswer, with_layers: bool, look: TextLayout) -> String {
+impl OddsAnswer {
+    /// Renders the answer as text for a console, with the facts that each happening needs if `with_layers`.
+    pub fn text(&self, with_layers: bool, look: TextLayout) -> String {
+        render(self, with_layers, look)
+    }
+}
+
+fn render(answer: &OddsAnswer, with_layers: bool, look: TextLayout) -> String {
     match &answer.finding {
         OddsFinding::Odds(odds) => analysis_text(odds, with_layers, look),
         OddsFinding::NoOrder => {

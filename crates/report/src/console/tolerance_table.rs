@@ -13,29 +13,29 @@
 
 use std::fmt::Write as _;
 
-use elbowroom::num::{End, Interval, Rational};
+use elbowroom_num::{End, Interval, Rational};
 use unicode_width::UnicodeWidthStr;
 
-use crate::number::{self, Rounding};
-use crate::terminal::{EMPHASIS, SECONDARY, TextLayout, WARNING, styled};
+use super::{EMPHASIS, SECONDARY, TextLayout, WARNING, styled};
+use crate::decimal::{self as number, Rounding};
 
 /// A row of the table.
 #[derive(Clone, Debug)]
-pub(crate) struct Row {
+pub struct Row {
     /// The parameter's name.
-    pub(crate) name: String,
+    pub name: String,
     /// The quantity in plain words.
-    pub(crate) quantity: String,
+    pub quantity: String,
     /// Its value in the original plan.
-    pub(crate) nominal: Rational,
+    pub nominal: Rational,
     /// The values it may take.
-    pub(crate) interval: Interval,
+    pub interval: Interval,
 }
 
 impl Row {
     /// Returns the smaller one of the two tolerated deviations, relative to the nominal value
     /// unless that is 0.
-    pub(crate) fn smaller_deviation(&self) -> Rational {
+    pub fn smaller_deviation(&self) -> Rational {
         let (lower, upper) = (&self.interval.lower, &self.interval.upper);
         let distance = |end: &End| Some((end.value()? - &self.nominal).abs());
         let room = [distance(lower), distance(upper)];
@@ -46,7 +46,7 @@ impl Row {
     }
 
     /// Returns `true` if the slack in one direction is below [`CRITICAL`] percent.
-    pub(crate) fn is_critical(&self) -> bool {
+    pub fn is_critical(&self) -> bool {
         let room = self.smaller_deviation();
         room.is_zero() || (!self.nominal.is_zero() && room < Rational::new(CRITICAL, 100))
     }
@@ -60,7 +60,7 @@ impl Row {
 }
 
 /// Slack below which a parameter is critical, in percent of the nominal value.
-pub(crate) const CRITICAL: i64 = 10;
+pub const CRITICAL: i64 = 10;
 /// Possible scales of the bars: the deviation at their ends, in percent.
 const SCALES: [i64; 7] = [1, 2, 5, 10, 20, 50, 100];
 /// Possible widths of the bar in columns; the first one that fits is used.
@@ -71,7 +71,7 @@ const SHORT_NAME: usize = 12;
 const GAP: usize = 2;
 
 /// Renders the rows as a table; empty without rows.
-pub(crate) fn render(rows: &[Row], look: TextLayout) -> String {
+pub fn render(rows: &[Row], look: TextLayout) -> String {
     if rows.is_empty() {
         return String::new();
     }

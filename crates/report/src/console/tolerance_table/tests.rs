@@ -1,9 +1,9 @@
-use elbowroom::num::{End, Interval};
+use elbowroom_num::{End, Interval};
 use insta::assert_snapshot;
 use unicode_width::UnicodeWidthStr;
 
 use super::{Row, render};
-use crate::terminal::TextLayout;
+use crate::console::TextLayout;
 
 const UTF8: TextLayout = TextLayout {
     width: 80,

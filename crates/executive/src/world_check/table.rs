@@ -100,20 +100,26 @@ impl Check {
 /// The outcome of a check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub(super) enum Outcome {
+pub enum Outcome {
+    /// No violation was found.
     Passed,
+    /// The world violated the requirement.
     Wrong,
+    /// The situation did not occur, or the world does not claim the capability.
     Skipped,
 }
 
 /// A row of the answer.
 #[derive(Clone, Debug, Serialize)]
-pub(super) struct Row {
-    pub(super) check: &'static str,
-    pub(super) what: &'static str,
-    pub(super) outcome: Outcome,
+pub struct Row {
+    /// The keyword of the check.
+    pub check: &'static str,
+    /// The requirement.
+    pub what: &'static str,
+    /// The outcome.
+    pub outcome: Outcome,
     /// Violations, or the reason why the check was skipped.
-    pub(super) why: Vec<String>,
+    pub why: Vec<String>,
 }
 
 /// Results of the checks so far.

@@ -13,9 +13,9 @@ use elbowroom::report::wire;
 use serde_json::{Value, json};
 
 use super::table::{Check, Findings};
-use elbowroom_executive::clock::Clock;
-use elbowroom_executive::messages::excerpt;
-use elbowroom_executive::world_protocol::{
+use crate::clock::Clock;
+use crate::messages::excerpt;
+use crate::world_protocol::{
     Capability, Greeting, LineReader, LineWriter, MAX_ANSWER, Message, MessageParser, ReadResult,
     WriteResult, belief_message, hello, wait_for_exit,
 };

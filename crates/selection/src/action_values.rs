@@ -1,0 +1,43 @@
+//! Table of action values from a model of the world: [`action_values()`].
+
+use std::sync::Arc;
+
+use elbowroom_execution::ActionValues;
+use elbowroom_mdp::{Policy, Settings};
+use elbowroom_model::Task;
+use elbowroom_sim::WorldModel;
+
+use crate::planners::Embedded;
+use crate::relevant_actions::ActionSets;
+
+/// Computes the values of all moves in the world of `model`, for executors that use them
+/// ([`Needs::action_values`](elbowroom_execution::executors::Needs::action_values)). `planner` makes the plans whose
+/// actions bound the values. Without it, the bounds use all actions.
+///
+/// # Errors
+/// The reason why there is no table, for users.
+pub fn action_values(
+    task: &Arc<Task>,
+    model: &WorldModel,
+    planner: Option<Embedded<'_>>,
+    settings: Settings,
+    goes_on: &(dyn Fn() -> bool + Sync),
+) -> Result<Arc<dyn ActionValues>, String> {
+    let sets = planner.map(|planner| ActionSets::for_policy(task, model, planner, goes_on));
+    let sets = sets.unwrap_or_default();
+    let settings = Settings {
+        plans: sets.plans,
+        fallbacks: sets.fallbacks,
+        ..settings
+    };
+    let policy = Policy::if_near_optimal(task, model, &settings, goes_on);
+    match policy.map_err(|error| error.what)? {
+        Some(policy) => Ok(Arc::new(policy)),
+        None if goes_on() => Err(
+            "it would have too many states, or its bounds would stay more than 2 percentage \
+             points apart"
+                .to_owned(),
+        ),
+        None => Err("the planning budget is spent (`--planning-budget`)".to_owned()),
+    }
+}
