@@ -1,0 +1,1 @@
+../../../examples/plansys2_world.py

@@ -1,0 +1,1 @@
+../../clients/python/elbowroom_world.py
