@@ -10,7 +10,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 
 # Time limit of each wait, in seconds. Only a hanging process reaches it.
-PATIENCE = 300
+PATIENCE = int(os.environ.get("PATIENCE", 300))
 AT_A_TIME = 4
 
 
@@ -61,6 +61,9 @@ class Stage:
     def events(self):
         return [it["event"] for it in self.log()]
 
+    def close(self):
+        """Ends what is still running."""
+
     def __str__(self):
         log = open(self.log_file, encoding="utf-8").read() if os.path.exists(self.log_file) else ""
         return f"exit code {self.code}\n{self.out}\n{self.errors}\n{log}"
@@ -91,6 +94,8 @@ def play(scenario, name, stage_for, domain_id, is_verbose):
         except Exception as error:  # each failure is reported with the messages of the scenario
             went_well = False
             said = f"WRONG: {type(error).__name__}: {error} at line {error.__traceback__.tb_next.tb_lineno}\n{stage}"
+        finally:
+            stage.close()
         if went_well and is_verbose:
             said += f"\n{stage}"
         print(f"{scenario.__name__}{name}: {said} ({time.monotonic() - begun:.0f} s)", flush=True)

@@ -71,14 +71,14 @@ class Client:
     def activity(self):
         return self.latest["state"].activity if "state" in self.latest else None
 
-    def call(self, name, **members):
+    def call(self, service, **members):
         """Calls a service."""
-        client = self._clients[name]
-        assert client.wait_for_service(self._patience), f"there is no service {name}"
+        client = self._clients[service]
+        assert client.wait_for_service(self._patience), f"there is no service {service}"
         done = threading.Event()
-        future = client.call_async(SERVICES[name].Request(**members))
+        future = client.call_async(SERVICES[service].Request(**members))
         future.add_done_callback(lambda _: done.set())
-        assert done.wait(self._patience), f"the service {name} has not answered"
+        assert done.wait(self._patience), f"the service {service} has not answered"
         return future.result()
 
     def send(self, **members):

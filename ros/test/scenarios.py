@@ -28,6 +28,7 @@ CONFIG = os.path.join(ROOT, "ros", "elbowroom_ros", "config")
 DOMAIN, PROBLEM, MAPPING = (os.path.join(CONFIG, it) for it in ("domain.pddl", "problem.pddl", "nav2.yaml"))
 SUCCEEDED, CANCELED, ABORTED = GoalStatus.STATUS_SUCCEEDED, GoalStatus.STATUS_CANCELED, GoalStatus.STATUS_ABORTED
 FLEET = {"r1": {"lasts": 1}, "r2": {"lasts": 1}}
+FEW_PLANS = "['--max-replans', '1']"
 # Two robots change places: at least three drives.
 SWAP = "(and (at r1 dock2) (at r2 dock1))"
 
@@ -56,17 +57,18 @@ class Stage(ros2_stage.Stage):
         self._there.append(process)
         return process
 
-    def end_all(self):
+    def close(self):
         """Ends all processes of the scenario, the executives first, as they use the robots."""
         if self._client is not None:
             self._client.close()
         end(*reversed(self._there))
 
-    def client(self):
+    def client(self, is_idle=True):
         """Returns the client, once the executive is idle."""
         if self._client is None:
             self._client = Client(self.domain_id, PATIENCE)
-        self.until("an idle executive", lambda: self._client.activity() == "resting")
+        if is_idle:
+            self.until("an idle executive", lambda: self._client.activity() == "resting")
         return self._client
 
     def until(self, what, holds):
@@ -130,7 +132,7 @@ def goals_are_achieved(stage):
     state = client.call("get_state").state
     assert {it.name: it.state for it in state.goals}.items() >= {"first": "achieved"}.items()
     assert [it for it in client.promises if it.promise and it.quantities[0].nominal == 3.0], client.promises
-    assert any("(move r1 dock1 lab)" in it for it in client.reasons), client.reasons
+    assert any("nothing is due before end of (move" in it for it in client.reasons), client.reasons
     assert client.levels["executive: executive"][0] == 0 and client.levels["executive: world"] == (0, "answers")
 
 
@@ -201,7 +203,7 @@ def a_goal_is_cancelled(stage):
     status, result = stage.result(goal)
     assert (status, result.state) == (ABORTED, "cancelled"), result
     answer = client.call("cancel_goal", name="swap")
-    assert not answer.success and "swap" in answer.message
+    assert not answer.success and "there is no open goal with this name" in answer.message, answer
 
 
 def goals_that_are_none(stage):
@@ -213,7 +215,7 @@ def goals_that_are_none(stage):
     assert (status, result.state) == (ABORTED, "rejected") and "moon" in result.reason, result
     status, result = stage.result(client.send(goal="(and (at r1 lab) (at r1 ward))"))
     assert status == ABORTED and result.state in ("impossible", "unplanned"), result
-    assert "(at r1 lab)" in result.reason and "(at r1 ward)" in result.reason, result
+    assert "no plan" in result.reason, result
     stage.until("its withdrawal", lambda: not [
         it for it in client.call("get_state").state.goals if it.state in ("pursued", "unplanned", "impossible")
     ])  # fmt: skip
@@ -261,12 +263,12 @@ def drives_that_fail(stage):
         text = file.read().replace("    feedback:", "    success: {error_code: 0}\n    feedback:")
     with open(mapping, "w", encoding="utf-8") as file:
         file.write(text)
-    stage.executive(mapping=mapping)
+    stage.executive(mapping=mapping, arguments=FEW_PLANS)
     client = stage.client()
     for robot, why in (("r1", "error_code 101, error_msg a chair is in the way"), ("r2", "error_code is 7, expected 0")):
         status, result = stage.result(client.send(goal=f"(at {robot} lab)"))
         assert status == ABORTED, result
-        assert any(why in line for line in stage.trace(client)), why
+        stage.until(why, lambda why=why: any(why in line for line in stage.trace(client)))
 
 
 def servers_that_are_not_there(stage):
@@ -276,11 +278,11 @@ def servers_that_are_not_there(stage):
         text = file.read()
     with open(mapping, "w", encoding="utf-8") as file:
         file.write(text + "wait_for: {servers: [/r1/navigate_to_pose], seconds: 2}\n")
-    stage.executive(mapping=mapping)
+    stage.executive(mapping=mapping, arguments=FEW_PLANS)
     client = stage.client()
     for robot, why in (("r1", "has rejected the goal"), ("r2", "no action server /r2/navigate_to_pose of type")):
         assert stage.result(client.send(goal=f"(at {robot} lab)"))[0] == ABORTED
-        assert any(why in line for line in stage.trace(client)), why
+        stage.until(why, lambda why=why: any(why in line for line in stage.trace(client)))
     with open(mapping, "w", encoding="utf-8") as file:
         file.write(text + "wait_for: {servers: [/r2/navigate_to_pose], seconds: 2}\n")
     node = stage.executive("-r", "__ns:=/other", mapping=mapping, restarts=0)
@@ -319,7 +321,7 @@ def a_server_disappears(stage):
     stage.robots(FLEET)
     assert stage.result(goal)[1].state == "achieved"
     assert stage.count("begins", "r1") == 2
-    assert any("/r1/navigate_to_pose has disappeared" in line for line in stage.trace(client))
+    stage.until("its reason", lambda: any("/r1/navigate_to_pose has disappeared" in it for it in stage.trace(client)))
 
 
 def a_server_is_killed_and_restarted(stage):
@@ -330,9 +332,10 @@ def a_server_is_killed_and_restarted(stage):
     goal = client.send(goal="(at r1 lab)")
     stage.until("a drive", lambda: stage.count("begins"))
     robots.kill()
+    robots.wait(PATIENCE)
     stage.robots(FLEET)
     assert stage.result(goal)[1].state == "achieved"
-    assert any("/r1/navigate_to_pose has disappeared" in line for line in stage.trace(client))
+    stage.until("its reason", lambda: any("/r1/navigate_to_pose has disappeared" in it for it in stage.trace(client)))
 
 
 def the_time_of_a_simulation(stage):
@@ -340,7 +343,7 @@ def the_time_of_a_simulation(stage):
     simulated = ("--ros-args", "-p", "use_sim_time:=true")
     stage.robots({"r1": {"lasts": 20}, "r2": {}}, *simulated)
     stage.executive(use_sim_time="true")
-    stage._client = client = Client(stage.domain_id, PATIENCE)
+    client = stage.client(is_idle=False)
     clock = {"now": 1000.0}
 
     def advance(seconds):
@@ -365,47 +368,50 @@ def the_time_of_a_simulation(stage):
     assert begun + 20 - zero - 1 < goal.result.time < clock["now"] - zero + 1, (begun, zero, goal.result.time)
 
 
+def errand_is_achieved(client):
+    goals = client.latest["state"].goals if "state" in client.latest else []
+    return any((it.name, it.state) == ("errand", "achieved") for it in goals)
+
+
 def a_killed_node_resumes(stage):
-    """Goals and facts are in the journal. Without a ledger, the robots stop."""
-    stage.robots({"r1": {"lasts": 4}, "r2": {"lasts": 4}})
-    options = {"journal": stage.file("journal")}
-    node = stage.executive(**options)
+    """Goals, facts and goals of action servers continue. Nothing is started twice."""
+    stage.robots({"r1": {"lasts": 12}, "r2": {"lasts": 4}})
+    journal = stage.file("journal")
+    node = stage.executive(journal=journal)
     client = stage.client()
     assert stage.result(client.send(goal="(at r2 ward)"))[1].state == "achieved"
     assert client.call("submit_goal", goal="(at r1 lab)", name="errand").success
     stage.until("a drive", lambda: stage.count("begins", "r1"))
     node.kill()
-    stage.until("the cancellation", lambda: stage.count("cancelled", "r1"))
+    node.wait(PATIENCE)
     client.latest.clear()
-    stage.executive(**options)
-    stage.until("the goal", lambda: [
-        it for it in getattr(client.latest.get("state"), "goals", []) if (it.name, it.state) == ("errand", "achieved")
-    ])  # fmt: skip
-    assert stage.count("begins", "r2") == 1, "r2 stays in the ward"
-    assert stage.count("begins", "r1") == 2
-
-
-def goals_of_servers_survive_a_kill(stage):
-    """With a ledger, goals of action servers continue. Nothing is started twice."""
-    stage.robots({"r1": {"lasts": 12}, "r2": {"lasts": 12}})
-    options = {"journal": stage.file("journal"), "ledger": stage.file("ledger")}
-    node = stage.executive(**options)
-    client = stage.client()
-    assert client.call("submit_goal", goal="(and (at r1 lab) (at r2 ward))", name="errand").success
-    stage.until("two drives", lambda: stage.count("begins") == 2)
-    node.kill()
-    client.latest.clear()
-    stage.executive(**options)
-    stage.until("the goal", lambda: [
-        it for it in getattr(client.latest.get("state"), "goals", []) if (it.name, it.state) == ("errand", "achieved")
-    ])  # fmt: skip
+    stage.executive(journal=journal)
+    stage.until("the goal", lambda: errand_is_achieved(client))
     assert stage.count("begins") == 2 and stage.count("ends") == 2 and stage.count("cancel") == 0
+
+
+def node_and_robots_are_killed(stage):
+    """Goals that no server knows any more have failed."""
+    robots = stage.robots({"r1": {"lasts": 600}})
+    journal = stage.file("journal")
+    node = stage.executive(journal=journal)
+    assert stage.client().call("submit_goal", goal="(at r1 lab)", name="errand").success
+    stage.until("a drive", lambda: stage.count("begins", "r1"))
+    for it in (node, robots):
+        it.kill()
+        it.wait(PATIENCE)
+    client = stage.client(is_idle=False)
+    client.latest.clear()
+    stage.robots(FLEET)
+    stage.executive(journal=journal)
+    stage.until("the goal", lambda: errand_is_achieved(client))
+    assert stage.count("begins") == 2 and stage.count("ends") == 1
 
 
 def a_killed_world_is_restarted(stage):
     """The same for the world's process alone."""
     stage.robots({"r1": {"lasts": 12}, "r2": {}})
-    stage.executive(ledger=stage.file("ledger"))
+    stage.executive()
     client = stage.client()
     goal = client.send(goal="(at r1 lab)")
     stage.until("a drive", lambda: stage.count("begins"))
@@ -448,7 +454,7 @@ def a_running_executive_is_offered(stage):
     stage.robots(FLEET)
     socket, token = stage.file("socket"), stage.file("token")
     with open(os.open(token, os.O_CREAT | os.O_WRONLY, 0o600), "w", encoding="utf-8") as file:
-        file.write("secret secret secret")
+        file.write("0123456789abcdef")
     line = [ELBOWROOM, "serve", DOMAIN, PROBLEM, "--http", "127.0.0.1:0", "--socket", socket, "--token", token]
     server = stage._begin([*line, "--world-process", f"{executable('action_world')} {MAPPING}"])
     stage.until("the socket", lambda: os.path.exists(socket))
@@ -485,7 +491,7 @@ def recordings_are_learnt_from(stage):
         stage.hear(stage.start(learn, stdout=subprocess.PIPE, stderr=subprocess.PIPE))
         assert stage.code == 0, stage.errors
         (move,) = json.loads(stage.out)["actions"]
-        assert move["name"] == "move" and move["attempts"] == actions, move
+        assert move["action"] == "move" and move["attempts"] == actions, move
     shutil.rmtree(stage.file("late"))
     run = stage.start([executable("bag_to_trace"), stage.file("late")], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     stage.hear(run)
@@ -508,7 +514,7 @@ SCENARIOS = [
     a_server_is_killed_and_restarted,
     the_time_of_a_simulation,
     a_killed_node_resumes,
-    goals_of_servers_survive_a_kill,
+    node_and_robots_are_killed,
     a_killed_world_is_restarted,
     a_second_executive_refuses,
     a_running_executive_is_offered,
@@ -516,18 +522,5 @@ SCENARIOS = [
 ]
 
 
-def with_end(scenario):
-    """Returns a scenario after which all of its processes are ended."""
-
-    def whole(stage):
-        try:
-            scenario(stage)
-        finally:
-            stage.end_all()
-
-    whole.__name__ = scenario.__name__
-    return whole
-
-
 if __name__ == "__main__":
-    play_all([(with_end(it), "", Stage) for it in SCENARIOS], sys.argv[2:])
+    play_all([(it, "", Stage) for it in SCENARIOS], sys.argv[2:])

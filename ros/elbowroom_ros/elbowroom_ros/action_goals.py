@@ -7,7 +7,6 @@ import time
 import uuid
 
 from action_msgs.msg import GoalStatus
-from action_msgs.srv import CancelGoal
 from elbowroom_world import Failed
 from rclpy.action import ActionClient
 from rclpy.action.client import ClientGoalHandle
@@ -47,8 +46,8 @@ class Job:
 class ActionGoals:
     """Starts, monitors and cancels goals. All communication with ROS is in the thread of the node's executor."""
 
-    def __init__(self, node, mapping):
-        self._node, self._mapping = node, mapping
+    def __init__(self, node, mapping, report_fact):
+        self._node, self._mapping, self._report_fact = node, mapping, report_fact
         self.actions, self.server_wait = list(mapping.actions), mapping.seconds
         self._types = {name: it.action_type() for name, it in mapping.actions.items()}
         self._clients = {}
@@ -60,8 +59,7 @@ class ActionGoals:
 
     def missing_servers(self):
         """Returns the required servers that are not there."""
-        services = {name for name, _ in self._node.get_service_names_and_types()}
-        return [it for it in self._mapping.servers if f"/{it.strip('/')}/_action/send_goal" not in services]
+        return [it for it in self._mapping.servers if not self._status_publishers(it)]
 
     def begin(self, action):
         """Begins an action, or continues one that was running before a restart."""
@@ -123,8 +121,8 @@ class ActionGoals:
     def _try_to_send(self, job):
         if job.is_cancelled and not job.action.is_resumed:
             self._end(job, job.action.was_cancelled)
-        elif job.client.server_is_ready() and self._status_publishers(job):
-            job.servers = self._status_publishers(job)
+        elif job.client.server_is_ready() and self._status_publishers(name_of(job)):
+            job.servers = self._status_publishers(name_of(job))
             job.is_sent = True
             identifier = UUID(uuid=list(bytes.fromhex(json.loads(job.action.memory)["goal"])))
             if job.action.is_resumed:
@@ -137,13 +135,14 @@ class ActionGoals:
             kind, within = job.mapping.type, self.server_wait
             self._end(job, job.action.failed, f"no action server {name_of(job)} of type {kind} within {within:g} s")
 
-    def _status_publishers(self, job):
-        topic = f"{name_of(job)}/_action/status"
-        return {bytes(it.endpoint_gid) for it in self._node.get_publishers_info_by_topic(topic)}
+    def _status_publishers(self, server):
+        # Only servers publish this topic, whereas clients count for the services.
+        found = self._node.get_publishers_info_by_topic(f"{server}/_action/status")
+        return {bytes(it.endpoint_gid) for it in found}
 
     def _is_lost(self, job):
         now = time.monotonic()
-        if job.client.server_is_ready() and job.servers & self._status_publishers(job):
+        if job.client.server_is_ready() and job.servers & self._status_publishers(name_of(job)):
             job.lost_since = None
         else:
             job.lost_since = job.lost_since or now
@@ -172,7 +171,7 @@ class ActionGoals:
         is_first, job.cancelled_at = job.cancelled_at is None, now
 
         def answered(future):
-            if is_first and future.result().return_code == CancelGoal.Response.ERROR_REJECTED:
+            if is_first and not future.result().goals_canceling:
                 text = f"{name_of(job)} does not accept the cancellation of {job.action.text}; it is repeated"
                 print(text, file=sys.stderr, flush=True)
 
@@ -204,8 +203,13 @@ class ActionGoals:
                 self._end(job, job.action.failed, f"{name_of(job)} does not know the goal: it was restarted")
 
     def _end(self, job, report, *arguments):
-        if self._jobs.pop(job.action.ticket, None) is not None:
-            report(*arguments)
+        if self._jobs.pop(job.action.ticket, None) is None:
+            return
+        if report in (job.action.failed, job.action.was_cancelled):
+            # Before the end, so that no plan is made without these facts.
+            for fact, value in job.mapping.facts_after_failure(job.bindings).items():
+                self._report_fact(fact, value)
+        report(*arguments)
 
 
 def name_of(job):

@@ -68,16 +68,10 @@ def claim_servers(node, is_shared):
     return claim
 
 
-def run_world(node, goals, options):
-    """Executes actions until the run is over."""
-    clock = None
-    if node.get_parameter("use_sim_time").value:
-        clock = SimulationClock(node)
-        clock.wait()
-    world = World("ros-actions", ledger=options.ledger, clock=clock)
-    world.starter(*goals.actions, resumes=options.ledger is not None)(goals.begin)
-    world.canceller(goals.cancel)
-    world.run()
+def make_world(node, options):
+    """Returns the world, and the clock of the simulation, if there is one."""
+    clock = SimulationClock(node) if node.get_parameter("use_sim_time").value else None
+    return World("ros-actions", ledger=options.ledger, clock=clock), clock
 
 
 def prepare(goals, claim):
@@ -101,14 +95,18 @@ def main():
     parser = argparse.ArgumentParser(prog="action_world", description=__doc__)
     parser.add_argument("mapping", help="the mapping, a YAML file")
     parser.add_argument("--ledger", help="file of started and ended actions: goals continue after a restart of this program")
+    parser.add_argument("--cancel-at-end", action="store_true", help="cancel running goals once Elbowroom has ended")
     parser.add_argument("--shared", action="store_true", help="allow other executives to use the same action servers")
     options = parser.parse_args(remove_ros_args(sys.argv)[1:])
     rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node("elbowroom_world")
+    world, clock = make_world(node, options)
     try:
-        goals = ActionGoals(node, Mapping.read(options.mapping))
+        goals = ActionGoals(node, Mapping.read(options.mapping), world.fact)
     except MappingError as error:
         sys.exit(f"error: {error}")
+    world.starter(*goals.actions, resumes=options.ledger is not None)(goals.begin)
+    world.canceller(goals.cancel)
     executor = SingleThreadedExecutor()
     executor.add_node(node)
 
@@ -127,7 +125,11 @@ def main():
     try:
         refusal = prepare(goals, claim)
         if refusal is None:
-            run_world(node, goals, options)
+            if clock is not None:
+                clock.wait()
+            world.run()
+            if options.cancel_at_end:
+                goals.cancel_all()
     except SystemExit:
         goals.cancel_all()
         raise

@@ -4,12 +4,14 @@ import os
 import queue
 import signal
 import sys
+import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from elbowroom_msgs.msg import Decision, Event, ExecutiveState, Guarantee
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -26,7 +28,7 @@ from .services import Services
 from .subscription import Subscription
 
 PARAMETERS = {
-    "domain": "", "problem": "", "plan": "", "mapping": "", "world": "", "executor": "live", "journal": "", "ledger": "",
+    "domain": "", "problem": "", "plan": "", "mapping": "", "world": "", "executor": "live", "journal": "",
     "shared": False, "elbowroom": "elbowroom", "http": "127.0.0.1:0", "restarts": 5, "address": "", "token": "",
 }  # fmt: skip
 STOP_WITHIN = 9.0
@@ -56,15 +58,19 @@ class Executive(Node):
         self._watchers = []
         self._wake = self.create_guard_condition(self._work)
         self._server = None
+        # Only the owner can read this folder.
+        self._folder = tempfile.TemporaryDirectory(prefix="elbowroom-")
         if not self.option("address"):
-            self._server = ServerProcess(self._server_options())
+            self._server = ServerProcess(self._server_options(), self._folder.name)
             self._server.start()
             self.client = Client(self._server.socket, self._server.token)
         else:
             self.client = Client(self.option("address"), read_token(self.option("token")))
         self._create_publishers()
-        self._services = Services(self)
-        self._goals = GoalAction(self)
+        # A callback that waits for the executive delays no other one.
+        self.requests = ReentrantCallbackGroup()
+        Services(self)
+        GoalAction(self)
         clock = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(0.2, self._watch_server, clock=clock)
         self.create_timer(1.0, self._beat, clock=clock)
@@ -87,11 +93,14 @@ class Executive(Node):
             raise ConfigurationError("give one of the parameters mapping and world")
         if options["mapping"]:
             words = [sys.executable, "-m", "elbowroom_ros.action_world", os.path.abspath(options["mapping"])]
-            words += ["--ledger", options["ledger"]] if options["ledger"] else []
+            # Goals continue over a restart of the world, and with a journal over one of this node.
+            is_kept = bool(options["journal"])
+            ledger = f"{options['journal']}.goals" if is_kept else os.path.join(self._folder.name, "goals")
+            words += ["--ledger", ledger, *([] if is_kept else ["--cancel-at-end"])]
             words += ["--shared"] if options["shared"] else []
             simulated = str(self.option("use_sim_time")).lower()
             words += ["--ros-args", "-p", f"use_sim_time:={simulated}", "-r", f"__ns:={self.get_namespace()}"]
-            options["world"] = shell_line(words)
+            options["world"] = command_line(words)
         return options
 
     def _create_publishers(self):
@@ -191,6 +200,7 @@ class Executive(Node):
         while time.monotonic() < until:
             self.executor.spin_once(timeout_sec=0.05)
         self._pool.shutdown(wait=False)
+        self._folder.cleanup()
 
 
 def severity_of(code):
@@ -207,9 +217,12 @@ def read_token(path):
         raise ConfigurationError(f"the parameter token: {error}") from None
 
 
-def shell_line(words):
-    """Returns a command line for `--world-process`, which is split like in a shell."""
-    return " ".join("'" + it.replace("'", "'\\''") + "'" for it in words)
+def command_line(words):
+    """Returns a command line for `--world-process`, which is split at spaces."""
+    for it in words:
+        if len(it.split()) != 1:
+            raise ConfigurationError(f"the path {it!r} must not contain spaces")
+    return " ".join(words)
 
 
 def main():

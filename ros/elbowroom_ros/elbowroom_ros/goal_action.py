@@ -12,9 +12,10 @@ class GoalAction:
 
     def __init__(self, node):
         self._node = node
-        self._server = ActionServer(
-            node, AchieveGoal, "~/achieve_goal", self._execute, cancel_callback=lambda _: CancelResponse.ACCEPT
-        )
+        ActionServer(
+            node, AchieveGoal, "~/achieve_goal", self._execute, cancel_callback=lambda _: CancelResponse.ACCEPT,
+            callback_group=node.requests,
+        )  # fmt: skip
 
     async def _execute(self, handle):
         node = self._node
@@ -69,4 +70,5 @@ class GoalAction:
         else:
             handle.abort()
         time = number(goal.get("since"), number(self._node.document.get("now"), 0.0))
-        return AchieveGoal.Result(name=goal["name"], state=state, reason=text(goal.get("why")), time=time)
+        reason = text(goal.get("why")) or text(self._node.document.get("why") if state in WITHOUT_PLAN else None)
+        return AchieveGoal.Result(name=goal["name"], state=state, reason=reason, time=time)

@@ -47,7 +47,7 @@ class Mapping:
 class ActionMapping:
     """The action server for one action of the domain."""
 
-    KEYS = {"parameters", "server", "type", "goal", "success", "failure", "measured", "feedback"}
+    KEYS = {"parameters", "server", "type", "goal", "success", "failure", "after_failure", "measured", "feedback"}
 
     def __init__(self, name, document, tables):
         self.place, self.tables = f"actions.{name}", tables
@@ -56,14 +56,18 @@ class ActionMapping:
         self.parameters = document.get("parameters", [])
         if not is_list_of_texts(self.parameters):
             raise MappingError(f"{self.place}.parameters: expected a list of names")
-        self.goal, self.success, self.measured = (
-            section(f"{self.place}.{key}", document.get(key, {})) for key in ("goal", "success", "measured")
+        self.goal, self.success, self.measured, self.after_failure = (
+            section(f"{self.place}.{key}", document.get(key, {}))
+            for key in ("goal", "success", "measured", "after_failure")
         )
+        for fact, value in self.after_failure.items():
+            if not isinstance(fact, str) or not isinstance(value, bool):
+                raise MappingError(f"{self.place}.after_failure: expected facts with true or false, found {fact}: {value}")
         self.failure = self._text(document, "failure") if "failure" in document else None
         keys = {"completion", "full", "remaining", "note"}
         self.feedback = section(f"{self.place}.feedback", document.get("feedback", {}), keys)
         self.full = number(f"{self.place}.feedback.full", self.feedback.get("full", 1))
-        for part in (self.server, self.goal, list(self.measured)):
+        for part in (self.server, self.goal, list(self.measured), list(self.after_failure)):
             self._check_placeholders(part)
 
     def _text(self, document, key):
@@ -153,6 +157,10 @@ class ActionMapping:
         fields = {name: getattr(result, name) for name in result.get_fields_and_field_types()}
         plain = {name: value for name, value in fields.items() if isinstance(value, (str, int, float)) and value}
         return ", ".join(f"{name} {value}" for name, value in plain.items()) or "without a reason"
+
+    def facts_after_failure(self, bindings):
+        """Returns the facts that are reported after a failure or a cancellation, with their values."""
+        return {self.resolve(fact, bindings): value for fact, value in self.after_failure.items()}
 
     def measured_changes(self, result, bindings):
         """Returns the measured changes of fluents."""

@@ -6,24 +6,22 @@ import secrets
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 
 PR_SET_PDEATHSIG = 1
 
 
 class ServerProcess:
-    """Starts `elbowroom serve`, or resumes it from its journal.
+    """Starts `elbowroom serve`, or resumes it from its journal. Its socket and token are in a folder that only the owner can
+    read.
 
     `options` has the members `elbowroom`, `domain`, `problem`, `plan`, `world` (a command line), `executor`, `journal`,
     `http`, `restarts` and `arguments` (a list)."""
 
-    def __init__(self, options):
+    def __init__(self, options, folder):
         self._options = options
-        # Only the owner can read this folder.
-        self._folder = tempfile.TemporaryDirectory(prefix="elbowroom-")
-        self.socket = os.path.join(self._folder.name, "socket")
-        self._token_file = os.path.join(self._folder.name, "token")
+        self.socket = os.path.join(folder, "socket")
+        self._token_file = os.path.join(folder, "token")
         self.token = secrets.token_hex(16)
         with open(os.open(self._token_file, os.O_CREAT | os.O_WRONLY, 0o600), "w", encoding="utf-8") as file:
             file.write(self.token)
@@ -73,7 +71,6 @@ class ServerProcess:
             except subprocess.TimeoutExpired:
                 self._process.kill()
                 self._process.wait()
-        self._folder.cleanup()
 
 
 def is_finished(journal):

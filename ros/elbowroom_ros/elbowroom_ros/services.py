@@ -13,14 +13,19 @@ class Services:
 
     def __init__(self, node):
         self._node = node
-        for name in ("pause", "resume", "stop"):
-            node.create_service(Trigger, f"~/{name}", self._trigger(f"/v1/{name}"))
-        node.create_service(GetState, "~/get_state", self._get_state)
-        node.create_service(SubmitGoal, "~/submit_goal", self._submit_goal)
-        node.create_service(CancelGoal, "~/cancel_goal", self._cancel_goal)
-        node.create_service(SetFact, "~/set_fact", self._set_fact)
-        node.create_service(SetNumber, "~/set_number", self._set_number)
-        node.create_service(ReportAction, "~/report_action", self._report_action)
+        served = {
+            "pause": (Trigger, self._trigger("/v1/pause")),
+            "resume": (Trigger, self._trigger("/v1/resume")),
+            "stop": (Trigger, self._trigger("/v1/stop")),
+            "get_state": (GetState, self._get_state),
+            "submit_goal": (SubmitGoal, self._submit_goal),
+            "cancel_goal": (CancelGoal, self._cancel_goal),
+            "set_fact": (SetFact, self._set_fact),
+            "set_number": (SetNumber, self._set_number),
+            "report_action": (ReportAction, self._report_action),
+        }
+        for name, (kind, serve) in served.items():
+            node.create_service(kind, f"~/{name}", serve, callback_group=node.requests)
 
     async def _change(self, response, method, path, body=None):
         status, answer = await self._node.ask(method, path, body)

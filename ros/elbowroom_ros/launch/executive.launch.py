@@ -13,7 +13,6 @@ TEXTS = {
     "world": ("", "In place of a mapping: the command of a world, such as elbowroom-plansys2"),
     "executor": ("live", "The executor"),
     "journal": ("", "File with which the executive resumes after a crash"),
-    "ledger": ("", "File with which goals of action servers continue after a crash"),
     "elbowroom": ("elbowroom", "Path of the command elbowroom"),
     "address": ("", "In place of a domain: HOST:PORT or socket of a running elbowroom serve"),
     "token": ("", "File with the token for that executive"),
