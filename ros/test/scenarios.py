@@ -342,7 +342,7 @@ def the_time_of_a_simulation(stage):
     """The world's time is that of /clock, which can stand still."""
     simulated = ("--ros-args", "-p", "use_sim_time:=true")
     stage.robots({"r1": {"lasts": 20}, "r2": {}}, *simulated)
-    stage.executive(use_sim_time="true")
+    node = stage.executive(use_sim_time="true")
     client = stage.client(is_idle=False)
     clock = {"now": 1000.0}
 
@@ -366,6 +366,14 @@ def the_time_of_a_simulation(stage):
     stage.until("a result", lambda: advance(0.1) or goal.result is not None)
     assert goal.result.state == "achieved"
     assert begun + 20 - zero - 1 < goal.result.time < clock["now"] - zero + 1, (begun, zero, goal.result.time)
+    # Even when the time stands still, a running action can be cancelled.
+    client.send(goal="(at r1 ward)")
+    stage.until("another drive", lambda: advance(0.1) or stage.count("begins") == 2)
+    silence = stage.until("a silent world", lambda: client.levels["executive: world"][0] and client.levels["executive: world"])
+    assert silence[0] == 2 and silence[1].startswith("no answer for"), silence
+    assert client.call("stop").success
+    stage.until("the cancellation", lambda: stage.count("cancelled"))
+    stage.until("the end of the node", lambda: node.poll() is not None)
 
 
 def errand_is_achieved(client):
@@ -388,6 +396,15 @@ def a_killed_node_resumes(stage):
     stage.executive(journal=journal)
     stage.until("the goal", lambda: errand_is_achieved(client))
     assert stage.count("begins") == 2 and stage.count("ends") == 2 and stage.count("cancel") == 0
+
+
+def a_killed_node_without_a_journal_cancels(stage):
+    stage.robots({"r1": {"lasts": 600}, "r2": {}})
+    node = stage.executive()
+    stage.client().send(goal="(at r1 lab)")
+    stage.until("a drive", lambda: stage.count("begins"))
+    node.kill()
+    stage.until("the cancellation", lambda: stage.count("cancelled"))
 
 
 def node_and_robots_are_killed(stage):
@@ -514,6 +531,7 @@ SCENARIOS = [
     a_server_is_killed_and_restarted,
     the_time_of_a_simulation,
     a_killed_node_resumes,
+    a_killed_node_without_a_journal_cancels,
     node_and_robots_are_killed,
     a_killed_world_is_restarted,
     a_second_executive_refuses,

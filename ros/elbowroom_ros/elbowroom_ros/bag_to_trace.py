@@ -10,8 +10,6 @@ import json
 import os
 import sys
 
-from rclpy.serialization import deserialize_message
-
 from .bags import BagError, messages
 
 EVENT, INFO = "elbowroom_msgs/msg/Event", "plansys2_msgs/msg/ActionExecutionInfo"
@@ -101,6 +99,8 @@ def seconds(stamp):
 
 def convert(path, folder):
     """Writes the logs in a recording to a folder. Returns the number of files."""
+    from rclpy.serialization import deserialize_message
+
     executives, infos, classes = {}, {}, {}
     for topic, kind, data in messages(path, (EVENT, INFO)):
         if kind not in classes:
