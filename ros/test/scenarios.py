@@ -15,6 +15,8 @@ import time
 import bags
 from action_msgs.msg import GoalStatus
 from client import Client
+from plansys2_msgs.msg import ActionExecutionInfo as Info
+from rclpy.serialization import serialize_message
 from rosgraph_msgs.msg import Clock
 
 HERE = os.path.dirname(os.path.abspath(__file__))
@@ -26,6 +28,7 @@ from ros2_stage import PATIENCE, end, play_all  # noqa: E402
 ELBOWROOM = os.path.abspath(sys.argv[1])
 CONFIG = os.path.join(ROOT, "ros", "elbowroom_ros", "config")
 DOMAIN, PROBLEM, MAPPING = (os.path.join(CONFIG, it) for it in ("domain.pddl", "problem.pddl", "nav2.yaml"))
+INTERFACES = os.path.join(ROOT, "crates", "plansys2", "tests", "ros2", "plansys2_msgs", "msg")
 SUCCEEDED, CANCELED, ABORTED = GoalStatus.STATUS_SUCCEEDED, GoalStatus.STATUS_CANCELED, GoalStatus.STATUS_ABORTED
 FLEET = {"r1": {"lasts": 1}, "r2": {"lasts": 1}}
 FEW_PLANS = "['--max-replans', '1']"
@@ -486,6 +489,45 @@ def a_running_executive_is_offered(stage):
     assert not stage.client().call("pause").success, "there is no token"
 
 
+def convert(stage, bag):
+    """Converts a recording. Returns the path of the only log."""
+    logs = f"{bag}-logs"
+    run = stage.start([executable("bag_to_trace"), bag, "-o", logs], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    stage.hear(run)
+    assert stage.code == 0, stage.errors
+    (log,) = os.listdir(logs)
+    return os.path.join(logs, log)
+
+
+def learn(stage, log):
+    """Returns the model of the only action in a log."""
+    command = [ELBOWROOM, "learn", log, "--json"]
+    stage.hear(stage.start(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE))
+    assert stage.code == 0, stage.errors
+    (move,) = json.loads(stage.out)["actions"]
+    assert move["action"] == "move", move
+    return move
+
+
+def recordings_of_plansys2_are_learnt_from(stage):
+    """Those of its executor, on the topic action_execution_info."""
+    with open(os.path.join(INTERFACES, "ActionExecutionInfo.msg"), encoding="utf-8") as file:
+        definition = file.read()
+    raw = []
+    for number, (lasts, outcome) in enumerate(((4, Info.SUCCEEDED), (6, Info.SUCCEEDED), (2, Info.FAILED))):
+        name = f"(move r{number} dock lab):0"
+        arguments = [f"r{number}", "dock", "lab"]
+        for status, seconds in ((Info.NOT_EXECUTED, 0), (Info.EXECUTING, 1), (outcome, lasts)):
+            info = Info(action_full_name=name, action="move", arguments=arguments, status=status)
+            info.start_stamp.sec, info.status_stamp.sec, info.duration.sec = 1700000000, 1700000000 + seconds, 5
+            raw.append(("/action_execution_info", serialize_message(info)))
+    bag = stage.file("plansys2")
+    bags.write(bag, "mcap", raw, "plansys2_msgs/msg/ActionExecutionInfo", definition)
+    move = learn(stage, convert(stage, bag))
+    assert (move["attempts"], move["durations"]["observed"], move["durations"]["censored"]) == (3, 2, 1), move
+    assert move["durations"]["mean"] > 0.9, "multiples of the planned duration"
+
+
 def recordings_are_learnt_from(stage):
     """Bags of both kinds, complete or from the middle of a run, become logs."""
     stage.robots({"r1": {"lasts": 1}, "r2": {"lasts": 2}})
@@ -498,17 +540,11 @@ def recordings_are_learnt_from(stage):
     # Without the header and the first action, this is no trace.
     first = next(index for index, it in enumerate(bags.events(events)) if '"outcome":"succeeded"' in it["line"])
     for name, kept, actions in (("sqlite3", client.raw, 3), ("mcap", client.raw, 3), ("late", events[first + 1 :], 2)):
-        bag, logs = stage.file(name), stage.file(f"{name}-logs")
+        bag = stage.file(name)
         bags.write(bag, "sqlite3" if name == "sqlite3" else "mcap", kept)
-        run = stage.start([executable("bag_to_trace"), bag, "-o", logs], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-        stage.hear(run)
-        (log,) = os.listdir(logs)
-        assert stage.code == 0 and log.endswith(".csv" if name == "late" else ".jsonl"), stage.out + stage.errors
-        learn = [ELBOWROOM, "learn", os.path.join(logs, log), "--json"]
-        stage.hear(stage.start(learn, stdout=subprocess.PIPE, stderr=subprocess.PIPE))
-        assert stage.code == 0, stage.errors
-        (move,) = json.loads(stage.out)["actions"]
-        assert move["action"] == "move" and move["attempts"] == actions, move
+        log = convert(stage, bag)
+        assert log.endswith(".csv" if name == "late" else ".jsonl"), log
+        assert learn(stage, log)["attempts"] == actions
     shutil.rmtree(stage.file("late"))
     run = stage.start([executable("bag_to_trace"), stage.file("late")], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     stage.hear(run)
@@ -537,6 +573,7 @@ SCENARIOS = [
     a_second_executive_refuses,
     a_running_executive_is_offered,
     recordings_are_learnt_from,
+    recordings_of_plansys2_are_learnt_from,
 ]
 
 

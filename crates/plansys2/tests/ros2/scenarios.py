@@ -274,8 +274,6 @@ def a_second_executor_of_a_server_refuses(stage):
 
     def run_others(client):
         stage.wait_for("the first start", lambda: "begins" in stage.events(), client)
-        # Until it has discovered others, a server gives way to one that starts at the same time.
-        time.sleep(3)
         for line in (server, [ELBOWROOM, "run", *YARD, "--world-process", stage.world]):
             other = stage.start(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
             out, errors = other.communicate(timeout=PATIENCE)
