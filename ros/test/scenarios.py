@@ -407,6 +407,7 @@ def a_killed_node_without_a_journal_cancels(stage):
     stage.client().send(goal="(at r1 lab)")
     stage.until("a drive", lambda: stage.count("begins"))
     node.kill()
+    node.wait(PATIENCE)
     stage.until("the cancellation", lambda: stage.count("cancelled"))
 
 
@@ -487,6 +488,18 @@ def a_running_executive_is_offered(stage):
     client.latest.clear()
     stage.executive(**options)
     assert not stage.client().call("pause").success, "there is no token"
+
+
+def the_protocol_is_kept(stage):
+    """Checked by Elbowroom, with restarts and cancellations."""
+    stage.robots({"r1": {"lasts": 2}, "r2": {"lasts": 2}})
+    plan = stage.file("plan")
+    with open(plan, "w", encoding="utf-8") as file:
+        file.write("0: (move r1 dock1 lab) [3]\n0: (move r2 dock2 ward) [3]\n")
+    world = f"{executable('action_world')} {MAPPING} --ledger {stage.file('ledger')}"
+    command = [ELBOWROOM, "world-check", world, DOMAIN, PROBLEM, plan]
+    stage.hear(stage.start(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE))
+    assert stage.code == 0, stage.out
 
 
 def convert(stage, bag):
@@ -571,6 +584,7 @@ SCENARIOS = [
     node_and_robots_are_killed,
     a_killed_world_is_restarted,
     a_second_executive_refuses,
+    the_protocol_is_kept,
     a_running_executive_is_offered,
     recordings_are_learnt_from,
     recordings_of_plansys2_are_learnt_from,

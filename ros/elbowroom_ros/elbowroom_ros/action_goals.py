@@ -21,6 +21,8 @@ PERIOD = 0.1
 """Interval of checks, in real seconds."""
 CANCEL_EVERY = 2.0
 """Interval at which a cancellation is repeated until the goal ends, in real seconds."""
+FEEDBACK_EVERY = 0.5
+"""Least interval between two reports of the progress of a goal, in real seconds. Each is a line of the trace."""
 LOST_AFTER = 1.0
 """Time without the server after which its goals have failed, in real seconds. ROS reports the end of a killed process only
 after a while (Fast DDS: 20 s)."""
@@ -41,6 +43,7 @@ class Job:
         self.is_cancelled = False
         self.cancelled_at = None
         self.first_remaining = None
+        self.progress, self.progress_at = None, float("-inf")
 
 
 class ActionGoals:
@@ -180,8 +183,11 @@ class ActionGoals:
     def _feedback(self, job, feedback):
         with self._lock:
             if job.action.ticket in self._jobs:
-                completion, note, job.first_remaining = job.mapping.progress(feedback, job.first_remaining)
-                job.action.feedback(completion, note)
+                *progress, job.first_remaining = job.mapping.progress(feedback, job.first_remaining)
+                now = time.monotonic()
+                if progress != job.progress and now - job.progress_at >= FEEDBACK_EVERY:
+                    job.progress, job.progress_at = progress, now
+                    job.action.feedback(*progress)
 
     def _result(self, job, response):
         with self._lock:
