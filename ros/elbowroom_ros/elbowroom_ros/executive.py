@@ -53,7 +53,7 @@ class Executive(Node):
         self.declare_parameter("arguments", Parameter.Type.STRING_ARRAY)
         self.document = {}
         self.exit_code = None
-        self._restarts, self.has_ended = 0, False
+        self._restarts, self._ended_at, self.has_ended = 0, None, False
         self._queue, self._pool = queue.SimpleQueue(), ThreadPoolExecutor(8)
         self._watchers = []
         self._wake = self.create_guard_condition(self._work)
@@ -95,7 +95,7 @@ class Executive(Node):
             words = [sys.executable, "-m", "elbowroom_ros.action_world", os.path.abspath(options["mapping"])]
             # Goals continue over a restart of the world, and with a journal over one of this node.
             is_kept = bool(options["journal"])
-            ledger = f"{options['journal']}.goals" if is_kept else os.path.join(self._folder.name, "goals")
+            ledger = os.path.abspath(f"{options['journal']}.goals") if is_kept else os.path.join(self._folder.name, "goals")
             words += ["--ledger", ledger, *([] if is_kept else ["--cancel-at-end"])]
             words += ["--shared"] if options["shared"] else []
             simulated = str(self.option("use_sim_time")).lower()
@@ -180,12 +180,16 @@ class Executive(Node):
     def _watch_server(self):
         if self._server is None or self.has_ended or (code := self._server.exit_code()) is None:
             return
-        if code == 0 or not self.option("journal") or self._restarts >= self.option("restarts"):
+        if code == 0 or not self._server.is_resumable() or self._restarts >= self.option("restarts"):
             self.get_logger().log(f"elbowroom serve has ended with exit code {code}", severity_of(code))
             self.exit_code = 0 if code == 0 else 1
             return
-        self._restarts += 1
-        self.get_logger().error(f"elbowroom serve has ended with exit code {code}; it is resumed from its journal")
+        if self._ended_at is None:
+            self._ended_at = time.monotonic()
+            self.get_logger().error(f"elbowroom serve has ended with exit code {code}; it is resumed from its journal")
+        if time.monotonic() - self._ended_at < 2**self._restarts / 2:
+            return
+        self._restarts, self._ended_at = self._restarts + 1, None
         self._subscription.restart()
         self._server.start()
 

@@ -49,14 +49,19 @@ class ServerProcess:
         common = ["--token", self._token_file, "--socket", self.socket, "--http", it["http"]]
         common += ["--restart-world", str(it["restarts"])]
         # A resumed run has the other options in its journal.
-        if it["journal"] and os.path.exists(it["journal"]) and os.path.getsize(it["journal"]) > 0:
-            if not is_finished(it["journal"]):
-                return [it["elbowroom"], "serve", "--resume", it["journal"], *common]
+        if self.is_resumable():
+            return [it["elbowroom"], "serve", "--resume", it["journal"], *common]
+        if has_contents(it["journal"]):
             os.rename(it["journal"], f"{it['journal']}.{time.time_ns() // 1_000_000}")
         line = [it["elbowroom"], "serve", *(it[name] for name in ("domain", "problem", "plan") if it[name]), *common]
         line += ["--world-process", it["world"], "--executor", it["executor"]]
         line += ["--journal", it["journal"]] if it["journal"] else []
         return [*line, *it["arguments"]]
+
+    def is_resumable(self):
+        """Returns `True` if there is the journal of a run that was not stopped."""
+        journal = self._options["journal"]
+        return has_contents(journal) and not is_finished(journal)
 
     def exit_code(self):
         """Returns the exit code, or `None` while the program runs."""
@@ -71,6 +76,10 @@ class ServerProcess:
             except subprocess.TimeoutExpired:
                 self._process.kill()
                 self._process.wait()
+
+
+def has_contents(path):
+    return bool(path) and os.path.exists(path) and os.path.getsize(path) > 0
 
 
 def is_finished(journal):
