@@ -10,7 +10,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 
 # Time limit of each wait, in seconds. Only a hanging process reaches it.
-PATIENCE = int(os.environ.get("PATIENCE", 300))
+PATIENCE = 300
 AT_A_TIME = 4
 
 

@@ -1,1 +1,0 @@
-../../../examples/plansys2_world.py

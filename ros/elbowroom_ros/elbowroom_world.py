@@ -1,1 +1,0 @@
-../../clients/python/elbowroom_world.py
