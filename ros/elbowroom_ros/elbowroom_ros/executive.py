@@ -62,6 +62,8 @@ class Executive(Node):
         self._folder = tempfile.TemporaryDirectory(prefix="elbowroom-")
         if not self.option("address"):
             self._server = ServerProcess(self._server_options(), self._folder.name)
+            if self._server.is_resumable():
+                self.get_logger().info("the run of the journal is resumed, with the options with which it began")
             self._server.start()
             self.client = Client(self._server.socket, self._server.token)
         else:

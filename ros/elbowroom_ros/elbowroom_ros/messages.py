@@ -15,9 +15,7 @@ SILENCE = 2.0
 
 def state_message(document, stamp):
     """Returns the state. Without a document, the executive is disconnected."""
-    goals = [goal_message(it) for it in goals_by_age(document)]
-    closed = [it for it in goals if it.state in CLOSED]
-    dropped = closed[: max(0, len(closed) - MOST_CLOSED_GOALS)]
+    goals = without_oldest_closed(goals_by_age(document))
     return ExecutiveState(
         stamp=stamp,
         time=number(document.get("now"), 0.0),
@@ -25,10 +23,17 @@ def state_message(document, stamp):
         reason=text(document.get("why")),
         world=world_problem(document),
         plans=document.get("plans", 0),
-        goals=[it for it in goals if it not in dropped],
+        goals=[goal_message(it) for it in goals],
         running=[running_message(it) for it in document.get("running", {}).values()],
         in_doubt=sorted(document.get("in_doubt", {})),
     )
+
+
+def without_oldest_closed(goals):
+    """Returns the goals, with the latest ones of those that are closed."""
+    closed = [index for index, it in enumerate(goals) if it["state"] in CLOSED]
+    dropped = set(closed[: max(0, len(closed) - MOST_CLOSED_GOALS)])
+    return [it for index, it in enumerate(goals) if index not in dropped]
 
 
 def goals_by_age(document):
