@@ -140,8 +140,13 @@ def main():
         executor.shutdown()
         rclpy.try_shutdown()
         spinning.join(timeout=5)
+        # Other nodes are notified of the end.
+        node.destroy_node()
     if refusal is not None:
-        sys.exit(f"error: {refusal}")
+        print(f"error: {refusal}", file=sys.stderr)
+    # Elbowroom waits a second for the end of this program, and unloading all libraries takes much of it.
+    sys.stderr.flush()
+    os._exit(0 if refusal is None else 1)
 
 
 if __name__ == "__main__":
