@@ -186,12 +186,17 @@ class Claim:
         self._publish, self._clock = publish, clock
         self.id = uuid.uuid4().hex
         self._name = f"process {os.getpid()} on {socket.gethostname()}"
-        self._held_since, self._last = None, None
+        self._held_since, self._last, self._is_released = None, None, False
         self.refusal = None
 
     def hold(self):
         self._held_since = self._clock()
         self.tick()
+
+    def release(self):
+        """Gives up the claim, so that another executor can start at once."""
+        self._is_released = True
+        self._publish(f"released {self.id} {self._name}")
 
     def _state(self):
         if self._held_since is None:
@@ -200,7 +205,7 @@ class Claim:
 
     def tick(self):
         """Publishes the claim if its state has changed."""
-        if self._last != (state := self._state()):
+        if not self._is_released and self._last != (state := self._state()):
             self._last = state
             self._publish(f"{self.STATES[state]} {self.id} {self._name}")
 
@@ -265,14 +270,19 @@ def main():
         world.starter("*")(hub.begin)
         world.canceller(hub.cancel)
         world.run()
+        claim.release()
         # Cancellations need time to reach the performers.
         time.sleep(0.2)
     # Stop the thread of ROS first: Python must not end while it is running.
     executor.shutdown()
     rclpy.try_shutdown()
     spinning.join(timeout=5)
+    node.destroy_node()
     if claim.refusal is not None:
-        sys.exit(f"error: {claim.refusal}")
+        print(f"error: {claim.refusal}", file=sys.stderr)
+    # Elbowroom waits a second for the end of this program, and unloading all libraries takes much of it.
+    sys.stderr.flush()
+    os._exit(0 if claim.refusal is None else 1)
 
 
 if __name__ == "__main__":
