@@ -166,7 +166,6 @@ impl Agenda {
         self.steps = vec![step];
     }
 
-    /// Removes all steps.
     pub(super) fn clear(&mut self) {
         self.steps.clear();
     }
@@ -176,7 +175,6 @@ impl Agenda {
         self.steps.pop().unwrap_or(PendingStep::Decide)
     }
 
-    /// Returns `true` if the next step is a decision.
     pub(super) fn is_empty(&self) -> bool {
         self.steps.is_empty()
     }
@@ -201,12 +199,10 @@ impl Agenda {
         self.continuation = Some(continuation);
     }
 
-    /// Returns the open question.
     pub(super) fn question(&self) -> Option<&Next> {
         self.question.as_ref()
     }
 
-    /// Takes the open question.
     pub(super) fn take_question(&mut self) -> Option<Next> {
         self.question.take()
     }
@@ -246,7 +242,6 @@ impl Agenda {
         self.continuation = None;
     }
 
-    /// Returns the identifier of the next request.
     pub(super) fn next_request(&mut self) -> RequestId {
         self.requests += 1;
         RequestId(self.requests)
@@ -262,7 +257,6 @@ impl Agenda {
         self.outbox.pop_front()
     }
 
-    /// Abandons a request.
     pub(super) fn abandon(&mut self, id: RequestId) {
         let before = self.outbox.len();
         self.outbox.retain(|next| next.request() != Some(id));

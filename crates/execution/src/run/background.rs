@@ -27,6 +27,7 @@ pub(super) struct BackgroundPlanning {
     search: Option<BackgroundSearch>,
     /// The situation of the next plan if a late action does not end, as reported to the planner.
     anticipated: Option<AnticipatedReplan>,
+    /// The expected planning time, in seconds of the world's clock.
     expected_time: Rational,
     /// The task with the goals of the present plan, with background planning.
     plan_task: Option<Arc<Task>>,
@@ -36,7 +37,6 @@ pub(super) struct BackgroundPlanning {
 }
 
 impl BackgroundPlanning {
-    /// Creates the state of a run without a search.
     pub(super) fn new(expected_time: Rational) -> Self {
         Self {
             search: None,
@@ -47,17 +47,14 @@ impl BackgroundPlanning {
         }
     }
 
-    /// Returns the search in progress.
     pub(super) fn search(&self) -> Option<&BackgroundSearch> {
         self.search.as_ref()
     }
 
-    /// Returns the search in progress.
     pub(super) fn search_mut(&mut self) -> Option<&mut BackgroundSearch> {
         self.search.as_mut()
     }
 
-    /// Takes the search in progress.
     pub(super) fn take_search(&mut self) -> Option<BackgroundSearch> {
         self.search.take()
     }
@@ -92,12 +89,10 @@ impl BackgroundPlanning {
         made.into_iter().chain(ready).map(arrival).collect()
     }
 
-    /// Returns the expected planning time, in seconds of the world's clock.
     pub(super) fn expected_time(&self) -> &Rational {
         &self.expected_time
     }
 
-    /// Restores the expected planning time.
     pub(super) fn set_expected_time(&mut self, time: Rational) {
         self.expected_time = time;
     }
@@ -170,17 +165,14 @@ impl BackgroundPlanning {
         }
     }
 
-    /// Sets the forecast that was reported to the planner.
     pub(super) fn set_anticipated(&mut self, anticipated: Option<AnticipatedReplan>) {
         self.anticipated = anticipated;
     }
 
-    /// Returns the forecast that was reported to the planner.
     pub(super) fn anticipated(&self) -> Option<&AnticipatedReplan> {
         self.anticipated.as_ref()
     }
 
-    /// Takes the forecast that was reported to the planner.
     pub(super) fn take_anticipated(&mut self) -> Option<AnticipatedReplan> {
         self.anticipated.take()
     }

@@ -42,22 +42,18 @@ impl<'a> Closing<'a> {
         }
     }
 
-    /// Sets the check whether the run is to end.
     pub(super) fn set_stop_check(&mut self, is_to_end: impl Fn() -> bool + Send + 'a) {
         self.stop_check = Box::new(is_to_end);
     }
 
-    /// Permits the run to continue after its end.
     pub(super) fn set_restarts(&mut self, times: usize) {
         self.restarts_left = times;
     }
 
-    /// Returns `true` if the run is to end.
     pub(super) fn is_stop_requested(&self) -> bool {
         (self.stop_check)()
     }
 
-    /// Returns `true` while running actions are cancelled.
     pub(super) fn is_shutting_down(&self) -> bool {
         self.shutdown.is_some()
     }
@@ -88,12 +84,10 @@ impl<'a> Closing<'a> {
         Some((shutdown.verdict, shutdown.dead_end))
     }
 
-    /// Ends the run.
     pub(super) fn finish(&mut self, report: Report) {
         self.report = Some(report);
     }
 
-    /// Returns the report, once the run is over.
     pub(super) fn report(&self) -> Option<&Report> {
         self.report.as_ref()
     }

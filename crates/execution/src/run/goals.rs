@@ -216,7 +216,6 @@ impl<'a> GoalManager<'a> {
         }
     }
 
-    /// Returns `true` if the run accepts requests.
     pub(super) fn accepts_requests(&self) -> bool {
         self.mode != Mode::OneGoal
     }
@@ -239,7 +238,6 @@ impl<'a> GoalManager<'a> {
             }
     }
 
-    /// Returns `true` if the goal of an attended run was abandoned.
     pub(super) fn is_goal_abandoned(&self) -> bool {
         self.mode == Mode::GoalAbandoned
     }
@@ -263,12 +261,10 @@ impl<'a> GoalManager<'a> {
         self.have_changed
     }
 
-    /// Returns `true` if there are no open goals.
     pub(super) fn is_empty(&self) -> bool {
         self.goals.is_empty()
     }
 
-    /// Returns `true` if nothing is to be started or planned for now.
     pub(super) fn is_paused(&self) -> bool {
         self.is_paused
     }
@@ -311,7 +307,6 @@ impl<'a> GoalManager<'a> {
         Some((words.unwrap_or_default(), change.are_goals_only_added))
     }
 
-    /// Restores a change of the goals.
     pub(super) fn restore_change(&mut self, change: Option<(String, bool)>) {
         self.pending_change =
             change.map(|(words, may_keep)| PendingGoalChange::of(words, may_keep));
@@ -336,7 +331,6 @@ impl<'a> GoalManager<'a> {
         ctx.pursue(&Arc::clone(ctx.task), &self.goals);
     }
 
-    /// Returns the open goals.
     pub(super) fn open(&self) -> Goals {
         Goals {
             open: self.goals.iter().map(GivenGoal::of).collect(),
@@ -344,7 +338,6 @@ impl<'a> GoalManager<'a> {
         }
     }
 
-    /// Returns the queued goals.
     pub(super) fn queued(&self) -> Vec<GivenGoal> {
         self.queued.iter().map(GivenGoal::of).collect()
     }
@@ -425,7 +418,6 @@ impl<'a> GoalManager<'a> {
         self.select_after_success(ctx);
     }
 
-    /// Drops the plan.
     pub(super) fn drop_plan(&mut self) {
         self.plan = None;
         self.planned_goals.clear();

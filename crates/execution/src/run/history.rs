@@ -67,12 +67,10 @@ impl History {
         self.is_explaining = true;
     }
 
-    /// Returns `true` if dead ends are to be explained.
     pub(super) fn is_explaining(&self) -> bool {
         self.is_explaining
     }
 
-    /// Records an observation that was believed.
     pub(super) fn record(&mut self, time: &Rational, kind: BelievedEventKind) {
         if self.is_explaining {
             let time = time.clone();

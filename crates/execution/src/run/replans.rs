@@ -13,7 +13,6 @@ pub(super) struct Replans {
 }
 
 impl Replans {
-    /// Restores the count.
     pub(super) fn restored(count: usize) -> Self {
         Self {
             count,
@@ -21,7 +20,6 @@ impl Replans {
         }
     }
 
-    /// Returns the number of new plans.
     pub(super) fn count(&self) -> usize {
         self.count
     }
@@ -40,12 +38,10 @@ impl Replans {
         self.reasons.pop();
     }
 
-    /// Begins to count again.
     pub(super) fn reset_count(&mut self) {
         self.count = 0;
     }
 
-    /// Forgets the reasons.
     pub(super) fn forget_reasons(&mut self) {
         self.reasons.clear();
     }
@@ -57,7 +53,6 @@ impl Replans {
         }
     }
 
-    /// Takes the reasons, for the report.
     pub(super) fn take_reasons(&mut self) -> Vec<Reason> {
         std::mem::take(&mut self.reasons)
     }

@@ -97,27 +97,22 @@ impl AbandonedPlan {
 }
 
 impl SearchResults {
-    /// Returns `true` if the present plan is infeasible.
     pub(super) fn is_plan_infeasible(&self) -> bool {
         self.is_plan_infeasible
     }
 
-    /// Records that the present plan is infeasible.
     pub(super) fn note_infeasible_plan(&mut self) {
         self.is_plan_infeasible = true;
     }
 
-    /// Records that the executor abandons the present plan.
     pub(super) fn note_abandoned(&mut self, plan: AbandonedPlan) {
         self.abandoned = Some(plan);
     }
 
-    /// Returns `true` if the executor has abandoned the present plan.
     pub(super) fn has_abandoned_plan(&self) -> bool {
         self.abandoned.is_some()
     }
 
-    /// Takes the abandoned plan.
     pub(super) fn take_abandoned(&mut self) -> Option<AbandonedPlan> {
         self.abandoned.take()
     }

@@ -38,7 +38,6 @@ pub(super) struct RunView<'r> {
 }
 
 impl RunView<'_> {
-    /// Returns `true` if the start of each running action has been reported.
     pub(super) fn are_all_starts_reported(&self) -> bool {
         let is_reported = |ticket| self.belief.running().contains_key(&ticket);
         self.log.open_tickets().all(is_reported)
@@ -78,7 +77,6 @@ impl RunView<'_> {
         self.situation_at(time, guess)
     }
 
-    /// Returns the situation after the expected planning time.
     pub(super) fn situation_after_planning(
         &self,
         guess: OverrunEstimate,

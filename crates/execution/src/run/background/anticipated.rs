@@ -72,7 +72,6 @@ impl AnticipatedReplan {
         }
     }
 
-    /// Returns the expected situation.
     pub(in crate::run) fn situation(&self) -> &Situation {
         &self.prospect.situation
     }
@@ -82,7 +81,6 @@ impl AnticipatedReplan {
         self.until > *now
     }
 
-    /// Records an event that was not foreseen.
     pub(super) fn note_unexpected_event(&mut self) {
         self.is_outdated = true;
     }

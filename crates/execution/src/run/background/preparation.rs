@@ -79,27 +79,22 @@ impl Preparation {
         (self.answer.is_none() && self.since.is_none()).then_some(self.request)
     }
 
-    /// Records an event that the plan does not account for.
     pub(super) fn note_unexpected_event(&mut self) {
         self.is_outdated = true;
     }
 
-    /// Returns `true` if an event has happened that the plan does not account for.
     pub(in crate::run) fn is_outdated(&self) -> bool {
         self.is_outdated
     }
 
-    /// Returns `true` if the plan was fitted to the present situation.
     pub(in crate::run) fn is_fitted(&self) -> bool {
         self.is_fitted
     }
 
-    /// Returns the time at which the plan was prepared.
     pub(in crate::run) fn ready_since(&self) -> Option<&Rational> {
         self.since.as_ref()
     }
 
-    /// Takes the prepared plan.
     pub(in crate::run) fn take_prepared(&mut self) -> Option<Result<PreparedPlan, PrepareError>> {
         self.answer.take()
     }

@@ -108,7 +108,6 @@ impl BackgroundSearch {
         self
     }
 
-    /// Returns the question that the search answers.
     pub(in crate::run) fn query(&self) -> &PlanQuery {
         &self.query
     }
@@ -174,7 +173,6 @@ impl BackgroundSearch {
         }
     }
 
-    /// Records an unexpected event.
     pub(super) fn note_unexpected_event(&mut self) {
         self.is_outdated = true;
     }
@@ -186,17 +184,14 @@ impl BackgroundSearch {
         }
     }
 
-    /// Returns `true` if an unexpected event has happened since the search began.
     pub(in crate::run) fn is_outdated(&self) -> bool {
         self.is_outdated
     }
 
-    /// Returns `true` if the planner has finished.
     pub(in crate::run) fn has_finished(&self) -> bool {
         self.has_finished
     }
 
-    /// Takes the planner's answer.
     pub(in crate::run) fn take_finished(&mut self) -> Option<Planned> {
         self.answer.take()
     }
@@ -219,7 +214,6 @@ impl BackgroundSearch {
         }
     }
 
-    /// Returns the started steps of the plan that was abandoned.
     pub(super) fn abandoned_steps(&self) -> &BTreeMap<StepId, ActionHandle> {
         &self.abandoned_steps
     }
@@ -232,22 +226,18 @@ impl BackgroundSearch {
         is_later && self.has_abandoned_plan()
     }
 
-    /// Returns the finished plan, and the time at which it was finished.
     pub(in crate::run) fn plan(&self) -> Option<&(TimeTriggeredPlan, Rational)> {
         self.plan.as_ref()
     }
 
-    /// Records the finished plan.
     pub(in crate::run) fn set_plan(&mut self, plan: TimeTriggeredPlan, now: &Rational) {
         self.plan = Some((plan, now.clone()));
     }
 
-    /// Returns the preparation of the plan.
     pub(in crate::run) fn preparation(&self) -> Option<&Preparation> {
         self.preparation.as_ref()
     }
 
-    /// Takes the preparation of the plan.
     pub(in crate::run) fn take_preparation(&mut self) -> Option<Preparation> {
         self.preparation.take()
     }
@@ -265,17 +255,14 @@ impl BackgroundSearch {
         self.preparation = Some(preparation);
     }
 
-    /// Returns the number of preparations so far.
     pub(in crate::run) fn preparations(&self) -> usize {
         self.preparations
     }
 
-    /// Returns the change of the goals for which the plan is kept.
     pub(in crate::run) fn kept_for_change(&self) -> Option<&PendingGoalChange> {
         self.kept_for_change.as_ref()
     }
 
-    /// Takes the change of the goals for which the plan is kept.
     pub(in crate::run) fn take_kept_for_change(&mut self) -> Option<PendingGoalChange> {
         self.kept_for_change.take()
     }
