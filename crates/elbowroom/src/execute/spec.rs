@@ -1,6 +1,7 @@
 //! Specification of a run as data: [`RunSpec`].
 
 mod assembly;
+mod error;
 mod text_form;
 
 use std::sync::Arc;
@@ -22,7 +23,8 @@ use crate::pipeline;
 pub(crate) use text_form::{as_text, listed};
 use text_form::{positive, required};
 
-pub use assembly::{AdversaryError, FirstPlanError, RunInputs, SpecError, WorldNames};
+pub use assembly::{RunInputs, WorldNames};
+pub use error::{AdversaryError, FirstPlanError, SpecError};
 
 /// Name for a run without a planner.
 pub const NO_PLANNER: &str = "none";
