@@ -27,6 +27,9 @@ REBUILT = (
     "execution sim report mdp learning selection export laboratory page executive cli python".split()
 )
 
+# The features of the artefacts in target/ after .ci/run; ELBOWROOM_DRILL_FEATURES replaces them.
+FEATURES = "elbowroom-plansys2/dds,elbowroom-python/extension-module"
+
 DELAY = """
 [[delay]]
 action = "weld-quickly"
@@ -63,7 +66,7 @@ def cargo(*arguments: str, **environment: str) -> subprocess.CompletedProcess[st
     # Their own optimisation level gives these artefacts their own names beside those of the unchanged sources.
     settings = [it for name in packages for it in ("--config", f"profile.dev.package.{name}.opt-level=0")]
     line = ["cargo", *arguments[:1], *settings, "--workspace"]
-    line += ["--features", "elbowroom-plansys2/dds,elbowroom-python/extension-module", *arguments[1:]]
+    line += ["--features", os.environ.get("ELBOWROOM_DRILL_FEATURES", FEATURES), *arguments[1:]]
     settings = {"CARGO_TARGET_DIR": str(TARGET), "CARGO_INCREMENTAL": "0", **environment}
     return subprocess.run(line, cwd=COPY, text=True, env={**os.environ, **settings}, capture_output=True)
 

@@ -15,7 +15,7 @@
 //! | how much may each quantity deviate? | [`EnvelopeRequest`] | [`EnvelopeAnswer`] |
 //! | for what values does it work? | [`EnvelopeRequest`] | [`RegionAnswer`] |
 //! | which least change makes it work? | [`RepairRequest`] | [`RepairAnswer`] |
-//! | how does its execution end? | [`RunRequest`] | [`RunAnswer`] |
+//! | how does its execution end? | [`RunInputs`](crate::execute::RunInputs) | [`RunAnswer`] |
 //! | which world do the logs suggest? | [`LearnRequest`] | [`LearnAnswer`] |
 //! | how likely is a plan to succeed? | [`OddsRequest`] | [`OddsAnswer`] |
 
@@ -44,7 +44,7 @@ pub use odds::{OddsAnswer, OddsRequest};
 pub use plan::{PlanAnswer, PlanOutcome, PlanRequest};
 pub use region::{RegionAnswer, RegionOutcome};
 pub use repair::{RepairAnswer, RepairOutcome, RepairRequest};
-pub use run::{RunAnswer, RunOutcome, RunProgress, RunRequest};
+pub use run::{RunAnswer, RunOutcome, RunProgress};
 pub use stn::{StnAnswer, StnOutcome, StnRequest};
 pub use violation::ViolationAnswer;
 

@@ -2,7 +2,7 @@
 //!
 //! [`execute()`] executes a plan in a world of the caller with one call. [`Execution`] builds a run
 //! from an executor, a planner, a preparer and a recorder. [`RunSpec`] is the specification of a
-//! run as data. All but the specification is in the crate `elbowroom-selection`.
+//! run as data, and [`RunInputs`] the same with its texts read. All but the specification is in the crate `elbowroom-selection`.
 
 mod spec;
 
@@ -17,6 +17,6 @@ pub use elbowroom_selection::{
 };
 pub use spec::{
     AdversaryError, AdversarySettings, EMBEDDED, FirstPlanError, MOST_STATES, NO_PLANNER,
-    NamedText, RunSpec, SpecError,
+    NamedText, RunInputs, RunSpec, SpecError, WorldNames,
 };
 pub(crate) use spec::{as_text, listed};

@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use elbowroom::execute::{ExactRegion, PlanPreparer, RunSpec, SpecError};
+use elbowroom::execute::{ExactRegion, PlanPreparer, RunInputs};
 use elbowroom::execution::executors::ExecutorSpec;
 use elbowroom::execution::{
     PlanForm, PreparationRequest, PreparationResult, PrepareError, PreparedPlan, Preparer,
@@ -29,17 +29,14 @@ pub struct BackgroundPreparer {
 type Work = BackgroundTask<Option<Result<PreparedPlan, PrepareError>>>;
 
 impl BackgroundPreparer {
-    /// Creates a preparer for runs of `spec`, with the completion signal of the run.
-    ///
-    /// # Errors
-    /// When the world file cannot be read.
-    pub fn new(spec: &RunSpec, task: &Task, signal: &CompletionSignal) -> Result<Self, SpecError> {
-        Ok(Self {
-            analyst: spec.analyst(task.problem())?,
-            executor: spec.executor.clone(),
+    /// Creates a preparer for a run, with the completion signal of the run.
+    pub fn new(inputs: &RunInputs, signal: &CompletionSignal) -> Self {
+        Self {
+            analyst: inputs.preparer(),
+            executor: inputs.spec().executor.clone(),
             signal: signal.clone(),
             work: None,
-        })
+        }
     }
 
     /// Starts a thread that prepares a plan and its dispatchable networks.

@@ -7,12 +7,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use elbowroom::answers::{Observer, StopRequest};
-use elbowroom::execute::RunSpec;
+use elbowroom::execute::{RunInputs, RunSpec};
 use elbowroom::execution::run::PlanningTime;
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
 use elbowroom::num::work::Stop;
-use elbowroom::pddl;
 use elbowroom::report::trace::TraceWriter;
 
 use crate::background_planner::BackgroundSettings;
@@ -31,7 +30,7 @@ use crate::process_world::ProcessLimits;
 use crate::request_check::{check, check_target};
 use crate::request_queue::{ExternalRequest, RequestQueue, RequestStatus};
 use crate::resume::{InterruptedRun, JournaledRun, ResumeSettings};
-use crate::run::{JournaledOutcome, RunError, RunHost, RunInputs};
+use crate::run::{JournaledOutcome, RunAssembly, RunError, RunHost};
 use crate::trace_buffer::TraceBuffer;
 
 /// Settings of an executive that its specification does not contain.
@@ -74,8 +73,7 @@ impl Default for ExecutiveSettings {
 /// One thread calls [`Executive::run`] or [`Executive::run_in`]. All other methods can be called from any thread during
 /// the run.
 pub struct Executive {
-    spec: RunSpec,
-    task: Arc<Task>,
+    inputs: RunInputs,
     /// The problem with its own table of facts, for checks of requests.
     checks: Task,
     settings: ExecutiveSettings,
@@ -169,21 +167,19 @@ impl Executive {
         start: Start,
         names: GoalNames,
     ) -> Result<Self, RunError> {
-        let read = pddl::read_problem(&spec.domain.source(), &spec.problem.source());
-        let (problem, _) = read.map_err(RunError::Problem)?;
-        let task = Arc::new(Task::new(problem).with_epsilon(spec.epsilon.clone()));
+        let (inputs, _) = RunInputs::read(spec)?;
+        let (spec, task) = (inputs.spec(), inputs.task());
         let buffer = TraceBuffer::bounded();
         let mut header = |line: &str| buffer.add(line);
-        let written = TraceWriter::new(Arc::clone(&task), &mut header).header(&spec);
+        let written = TraceWriter::new(Arc::clone(task), &mut header).header(spec);
         written.map_err(|error| Error::new(format!("cannot write the trace: {error}"), ""))?;
-        let status = Status::new(&task, spec.timeout.clone());
+        let status = Status::new(task, spec.timeout.clone());
         // Until its journal is replayed.
         status.set_replayed(matches!(start, Start::Resumed(_)));
         Ok(Self {
             status,
             checks: task.with_own_table(),
-            spec,
-            task,
+            inputs,
             settings,
             queue: RequestQueue::default(),
             names,
@@ -232,12 +228,12 @@ impl Executive {
 
     /// Returns the specification of the run.
     pub fn spec(&self) -> &RunSpec {
-        &self.spec
+        self.inputs.spec()
     }
 
     /// Returns the problem of the run.
     pub fn task(&self) -> &Arc<Task> {
-        &self.task
+        self.inputs.task()
     }
 
     /// Returns the published status of the run: goals, plan, guarantee and the next decision.
@@ -322,7 +318,7 @@ impl Executive {
         let journal = match start {
             Start::Resumed(run) => {
                 let settings = ResumeSettings {
-                    task: &self.task,
+                    inputs: &self.inputs,
                     embedded,
                     background,
                     limits,
@@ -334,9 +330,8 @@ impl Executive {
             }
             Start::New(journal) => journal,
         };
-        let inputs = RunInputs {
-            spec: &self.spec,
-            task: &self.task,
+        let run = RunAssembly {
+            inputs: &self.inputs,
             first_plan: None,
             embedded,
             operator: &operator,
@@ -348,11 +343,11 @@ impl Executive {
         };
         match journal {
             Some(file) => {
-                let outcome = inputs.execute_journaled(file, self, &mut watcher);
+                let outcome = run.execute_journaled(file, self, &mut watcher);
                 finish_learning(learning, outcome)
             }
             None => Ok(JournaledOutcome {
-                outcome: inputs.execute(&mut |_| {}, self, &mut watcher)?,
+                outcome: run.execute(&mut |_| {}, self, &mut watcher)?,
                 journal_failure: None,
             }),
         }

@@ -30,6 +30,7 @@ mod background_task;
 pub mod belief_updates;
 pub mod clock;
 pub mod completion_signal;
+mod decorators;
 mod embedded_world;
 mod error;
 mod executive;

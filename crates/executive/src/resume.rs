@@ -11,32 +11,29 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use elbowroom::answers::Observer;
 use elbowroom::answers::run::run as execute;
-use elbowroom::answers::{Observer, RunRequest};
-use elbowroom::execute::RunSpec;
-use elbowroom::execute::SpecError;
+use elbowroom::execute::{RunInputs, RunSpec};
 use elbowroom::execution::run::Verdict;
 use elbowroom::execution::{Command, Observation, TimeAdvance, World, WorldError};
-use elbowroom::model::Task;
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
 use elbowroom::report::trace::schema::ObservationLine;
 use elbowroom::report::trace::{Line, ReplayWorld, SnapshotLine, Stored};
 use serde_json::Value;
 
-use crate::background_planner::{BackgroundPlanner, BackgroundSettings};
-use crate::background_preparer::BackgroundPreparer;
+use crate::background_planner::BackgroundSettings;
 use crate::belief_updates::BeliefUpdates;
 use crate::clock::Clock;
+use crate::decorators::Decorators;
 use crate::embedded_world::EmbeddedWorld;
 use crate::error::{Error, WarningSink};
 use crate::interface::Status;
 use crate::journal::{DAMAGE_ADVICE, Journal, JournalFile, WallTime, is_journal};
 use crate::journaling::{JournalHealth, JournalWriter, JournaledWorld};
-use crate::operator::InteractiveWorld;
 use crate::process_world::ProcessLimits;
 use crate::restartable_world::RestartableWorld;
-use crate::run::{EntryObserver, JournaledOutcome, RunError, RunHost, ViewedRecorder, both};
+use crate::run::{EntryObserver, JournaledOutcome, RunError, RunHost};
 use crate::running_actions::{self, RunningActions};
 use crate::world_connection::{Launch, WorldSource};
 use elapsed::Elapsed;
@@ -64,8 +61,8 @@ pub enum JournaledRun {
 
 /// Settings for a resumed run, which its journal does not contain.
 pub struct ResumeSettings<'a> {
-    /// The problem of the specification, with a new table of facts.
-    pub task: &'a Arc<Task>,
+    /// The specification of the journal, with its texts read, and a new table of facts.
+    pub inputs: &'a RunInputs,
     /// The world, if it is an object in this process.
     pub embedded: Option<&'a mut dyn EmbeddedWorld>,
     /// Background planning, with the stop request of the run.
@@ -198,19 +195,20 @@ impl InterruptedRun {
             journal,
             length,
             stored,
-            spec,
+            spec: _,
             file,
         } = self;
         let ResumeSettings {
-            task,
+            inputs,
             embedded,
             background,
             limits,
             observer,
             warnings,
         } = settings;
+        let (spec, task) = (inputs.spec(), inputs.task());
         let name = path.display().to_string();
-        let source = WorldSource::of(&spec, embedded)?;
+        let source = WorldSource::of(spec, embedded)?;
         let wrong = |error: &dyn fmt::Display| other_version_error(&name, error);
         // Before any other fact is mentioned: the table of facts has to be as it was.
         let snapshot = stored.snapshot().map_err(|error| wrong(&error))?;
@@ -221,7 +219,7 @@ impl InterruptedRun {
         let first = first.transpose().map_err(|error| wrong(&error))?.flatten();
         let file = file.map_or_else(|| JournalFile::reopen(&path, &journal, length), Ok)?;
         let mut file = file.with_rotation(host.segments(), &warnings);
-        let operator = host.operator(&spec, task)?;
+        let operator = host.operator(spec, task)?;
         if let Some(snapshot) = &snapshot {
             operator.begin_at(snapshot);
         }
@@ -232,27 +230,29 @@ impl InterruptedRun {
         let health = JournalHealth::default();
         let beliefs = BeliefUpdates::default();
         let replay = Arc::new(JournalReplay::new(&stored));
-        let buffer = host.open_viewers(&spec, task, &operator)?;
+        let buffer = host.open_viewers(spec, task, &operator)?;
+        let decorators = Decorators {
+            inputs,
+            operator: &operator,
+            background: &background,
+        };
         let outcome = {
             let recorder = ReplayRecorder {
                 replay: Arc::clone(&replay),
                 task: Arc::clone(task),
                 writer: JournalWriter::new(task, &mut file, &health, &operator),
             };
-            let recorder = operator.publishing(recorder, task, true);
+            let mut recorder = decorators.recorder(recorder, true, buffer, observer);
             let clock = Clock::stopwatch();
             let continues = || !stop.is_requested();
-            let model = spec.beliefs(task.problem()).map_err(SpecError::World)?;
-            let planner = spec.planner_for(task, model.as_ref(), &clock, &continues)?;
-            let planner = Box::new(BackgroundPlanner::new(planner, &spec, &background));
-            let request = RunRequest::new(&spec, task)
+            let planner = Box::new(decorators.planner(&clock, &continues)?);
+            let planner = ResumedPlanner::new(&stored, planner);
+            let execution = decorators
+                .execution(planner, beliefs.listener())?
                 .beginning_with(first)
                 .resume_from(stand)
                 .with_restarts(stored.restart_count() + usize::from(stored.is_complete()))
-                .with_planner(ResumedPlanner::new(&stored, planner))
-                .with_preparer(BackgroundPreparer::new(&spec, task, &background.signal)?)
-                .on_belief(both(operator.listener(), beliefs.listener()))
-                .recorded_by(ViewedRecorder::new(recorder, task, buffer, observer));
+                .recorded_by(&mut recorder);
             let elapsed = Elapsed::of(&journal, &stored, snapshot.as_ref());
             let launch = Launch {
                 source,
@@ -273,17 +273,16 @@ impl InterruptedRun {
                 status: operator.status().cloned(),
             };
             let world = JournaledWorld::new(world, health.clone());
-            let signal = &background.signal;
-            let mut world =
-                InteractiveWorld::new(world, &operator, task, stop, signal, &Rational::ONE)
-                    .with_running(running_actions::open(snapshot.as_ref()))
-                    .live_when(|| replay.is_over());
+            let mut world = decorators
+                .world(world, &Rational::ONE)
+                .with_running(running_actions::open(snapshot.as_ref()))
+                .live_when(|| replay.is_over());
             let mut watcher = ReplayWatcher {
                 inner: watcher,
                 replay: Arc::clone(&replay),
                 health,
             };
-            let outcome = execute(request, &mut world, &mut watcher);
+            let outcome = execute(inputs, execution, &mut world, &mut watcher);
             world.into_inner().into_inner().world.stop();
             outcome?
         };

@@ -6,24 +6,23 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use elbowroom::answers::run::{RunOutcome, run as execute};
-use elbowroom::answers::{Event, Observer, RunRequest, StopRequest};
-use elbowroom::execute::{RunSpec, SpecError};
-use elbowroom::execution::run::RunSnapshot;
+use elbowroom::answers::{Event, Observer, StopRequest};
+use elbowroom::execute::{RunInputs, RunSpec, SpecError};
 use elbowroom::execution::{BeliefState, Entry, Planner, Recorder, World};
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
-use elbowroom::report::trace::{Line, TraceWriter};
+use elbowroom::report::trace::TraceWriter;
 use elbowroom::text::Diagnostics;
 
-use crate::background_planner::{BackgroundPlanner, BackgroundSettings};
-use crate::background_preparer::BackgroundPreparer;
+use crate::background_planner::BackgroundSettings;
 use crate::belief_updates::BeliefUpdates;
 use crate::clock::Clock;
+use crate::decorators::Decorators;
 use crate::embedded_world::EmbeddedWorld;
 use crate::error::{Error, WarningSink};
 use crate::journal::{JournalFile, Segments};
 use crate::journaling::{JournalHealth, JournalWriter, JournaledWorld};
-use crate::operator::{InteractiveWorld, OperatorInterface};
+use crate::operator::OperatorInterface;
 use crate::process_world::ProcessLimits;
 use crate::realtime::{Realtime, ScaledClock, TimedPlanner};
 use crate::restartable_world::RestartableWorld;
@@ -93,7 +92,10 @@ impl std::error::Error for RunError {}
 
 impl From<SpecError> for RunError {
     fn from(error: SpecError) -> Self {
-        Self::Spec(error)
+        match error {
+            SpecError::Problem(mistakes) => Self::Problem(mistakes),
+            error => Self::Spec(error),
+        }
     }
 }
 
@@ -115,12 +117,10 @@ pub struct JournaledOutcome {
 /// Callback for entries of the record.
 pub type EntryObserver<'a> = Box<dyn FnMut(&Entry<'_>) + Send + 'a>;
 
-/// Inputs of a run.
-pub struct RunInputs<'a> {
-    /// The specification.
-    pub spec: &'a RunSpec,
-    /// The problem of the specification.
-    pub task: &'a Arc<Task>,
+/// A run with its surroundings.
+pub struct RunAssembly<'a> {
+    /// The specification, with its texts read.
+    pub inputs: &'a RunInputs,
     /// The first plan; without it, the planner makes one.
     pub first_plan: Option<TimeTriggeredPlan>,
     /// The world, if it is an object in this process.
@@ -139,7 +139,7 @@ pub struct RunInputs<'a> {
     pub warnings: WarningSink,
 }
 
-impl<'a> RunInputs<'a> {
+impl<'a> RunAssembly<'a> {
     /// Executes a run without a journal. `trace` receives the lines of the trace, with their line feeds. `watcher` can
     /// end the run early.
     ///
@@ -151,21 +151,29 @@ impl<'a> RunInputs<'a> {
         host: &dyn RunHost,
         watcher: &mut (dyn Observer + Send),
     ) -> Result<RunOutcome, RunError> {
-        let task = self.task;
-        let buffer = host.open_viewers(self.spec, task, self.operator)?;
+        let (spec, task) = (self.inputs.spec(), self.inputs.task());
+        let buffer = host.open_viewers(spec, task, self.operator)?;
         let mut writer = TraceWriter::new(Arc::clone(task), trace);
-        let written = writer.header(self.spec);
+        let written = writer.header(spec);
         written.map_err(|error| Error::new(format!("cannot write the trace: {error}"), ""))?;
-        let writer = self.operator.publishing(&mut writer, task, false);
-        let mut writer = ViewedRecorder::new(writer, task, buffer, self.observer.take());
-        if self.spec.world_process.is_none() {
-            return Ok(self.simulated(&mut writer, host, watcher)?);
+        let observer = self.observer.take();
+        let background = self.background.clone();
+        let decorators = self.decorators(&background);
+        let mut writer = decorators.recorder(&mut writer, false, buffer, observer);
+        if spec.world_process.is_none() {
+            return Ok(self.simulated(decorators, &mut writer, host, watcher)?);
         }
         let beliefs = BeliefUpdates::default();
         let world = RestartableWorld::start(self.launch()?, beliefs.clone())?;
-        let mut world = self.interactive(world, &Rational::ONE);
+        let mut world = decorators.world(world, &Rational::ONE);
         host.started();
-        let outcome = self.run(&mut world, &mut writer, beliefs.listener(), watcher);
+        let outcome = self.run(
+            decorators,
+            &mut world,
+            &mut writer,
+            beliefs.listener(),
+            watcher,
+        );
         world.into_inner().stop();
         Ok(outcome?)
     }
@@ -173,14 +181,14 @@ impl<'a> RunInputs<'a> {
     /// Executes a run in a world that is a process or in this process, with an empty journal.
     ///
     /// # Errors
-    /// As [`RunInputs::execute`], and when the first record cannot be written.
+    /// As [`RunAssembly::execute`], and when the first record cannot be written.
     pub fn execute_journaled(
         mut self,
         mut file: JournalFile,
         host: &dyn RunHost,
         watcher: &mut (dyn Observer + Send),
     ) -> Result<JournaledOutcome, RunError> {
-        let (spec, task) = (self.spec, self.task);
+        let (spec, task) = (self.inputs.spec(), self.inputs.task());
         let mut is_written = false;
         let mut sink = |line: &str| is_written = file.write(line);
         let mut header = TraceWriter::new(Arc::clone(task), &mut sink);
@@ -199,17 +207,19 @@ impl<'a> RunInputs<'a> {
         let beliefs = BeliefUpdates::default();
         let world = RestartableWorld::start(self.launch()?, beliefs.clone())?;
         let world = JournaledWorld::new(world, health.clone());
-        let mut world = self.interactive(world, &Rational::ONE);
+        let (observer, background) = (self.observer.take(), self.background.clone());
+        let decorators = self.decorators(&background);
+        let mut world = decorators.world(world, &Rational::ONE);
         host.started();
         let outcome = {
             let writer = JournalWriter::new(task, &mut file, &health, self.operator);
-            let writer = self.operator.publishing(writer, task, true);
-            let mut writer = ViewedRecorder::new(writer, task, buffer, self.observer.take());
+            let mut writer = decorators.recorder(writer, true, buffer, observer);
             let mut watcher = JournalWatcher {
                 inner: watcher,
                 health,
             };
-            self.run(&mut world, &mut writer, beliefs.listener(), &mut watcher)
+            let listener = beliefs.listener();
+            self.run(decorators, &mut world, &mut writer, listener, &mut watcher)
         };
         world.into_inner().into_inner().stop();
         Ok(JournaledOutcome {
@@ -218,11 +228,23 @@ impl<'a> RunInputs<'a> {
         })
     }
 
+    /// Returns the decorators of the run's ports.
+    fn decorators<'d>(&self, background: &'d BackgroundSettings) -> Decorators<'d>
+    where
+        'a: 'd,
+    {
+        Decorators {
+            inputs: self.inputs,
+            operator: self.operator,
+            background,
+        }
+    }
+
     /// Returns the arguments for the connection to the world.
     fn launch(&mut self) -> Result<Launch<'a>, Error> {
         Ok(Launch {
-            source: WorldSource::of(self.spec, self.embedded.take())?,
-            task: self.task,
+            source: WorldSource::of(self.inputs.spec(), self.embedded.take())?,
+            task: self.inputs.task(),
             limits: self.limits.clone(),
             stop: self.background.stop.clone(),
             warnings: self.warnings.clone(),
@@ -230,132 +252,63 @@ impl<'a> RunInputs<'a> {
         })
     }
 
-    /// Wraps a world for operators' requests and background planning.
-    fn interactive<'w, W: World>(&self, world: W, factor: &Rational) -> InteractiveWorld<'w, W> {
-        let BackgroundSettings { stop, signal, .. } = &self.background;
-        InteractiveWorld::new(world, self.operator, self.task, stop, signal, factor)
-    }
-
     fn run(
         self,
+        decorators: Decorators<'_>,
         world: &mut dyn World,
         recorder: &mut dyn Recorder,
-        mut listener: impl FnMut(&BeliefState) + Send,
+        listener: impl FnMut(&BeliefState) + Send,
         watcher: &mut (dyn Observer + Send),
     ) -> Result<RunOutcome, SpecError> {
         let clock = Clock::stopwatch();
         let continues = || !self.background.stop.is_requested();
-        let model = self.spec.beliefs(self.task.problem());
-        let model = model.map_err(SpecError::World)?;
-        let planner = self
-            .spec
-            .planner_for(self.task, model.as_ref(), &clock, &continues)?;
-        let signal = &self.background.signal;
-        let request = RunRequest::new(self.spec, self.task)
+        let planner = decorators.planner(&clock, &continues)?;
+        let execution = decorators.execution(planner, listener)?;
+        let execution = execution
             .beginning_with(self.first_plan)
-            .with_planner(BackgroundPlanner::new(planner, self.spec, &self.background))
-            .with_preparer(BackgroundPreparer::new(self.spec, self.task, signal)?)
-            .on_belief(both(self.operator.listener(), &mut listener))
             .recorded_by(recorder);
-        execute(request, world, watcher)
+        execute(self.inputs, execution, world, watcher)
     }
 
     /// Executes a run in the simulated world of the specification, on a wall clock if it has one.
     fn simulated(
         self,
+        decorators: Decorators<'_>,
         recorder: &mut dyn Recorder,
         host: &dyn RunHost,
         watcher: &mut (dyn Observer + Send),
     ) -> Result<RunOutcome, SpecError> {
-        let (spec, task) = (self.spec, self.task);
-        let model = spec.simulation(task.problem()).map_err(SpecError::World)?;
-        let model = model.unwrap_or_default();
-        let beliefs = spec.beliefs(task.problem()).map_err(SpecError::World)?;
-        let mut world = spec.world(&model, task, self.first_plan.as_ref())?;
+        let spec = self.inputs.spec();
+        let mut world = self.inputs.world(self.first_plan.as_ref())?;
         host.started();
         let Some(factor) = &spec.realtime else {
-            return self.run(world.as_mut(), recorder, |_: &BeliefState| {}, watcher);
+            return self.run(
+                decorators,
+                world.as_mut(),
+                recorder,
+                |_: &BeliefState| {},
+                watcher,
+            );
         };
         let world_clock = ScaledClock::new(factor, self.since);
-        let begun = Clock::start();
-        let clock = || begun.seconds();
+        let clock = Clock::stopwatch();
         let continues = || !self.background.stop.is_requested();
-        let planner = spec.planner_for(task, beliefs.as_ref(), &clock, &continues)?;
-        let planner: Box<dyn Planner> =
-            Box::new(BackgroundPlanner::new(planner, spec, &self.background));
         let world = Realtime {
             inner: world.as_mut(),
             clock: &world_clock,
             stop: &self.background.stop,
         };
-        let mut world = self.interactive(world, factor);
-        let signal = &self.background.signal;
-        let request = RunRequest::new(spec, task)
+        let mut world = decorators.world(world, factor);
+        let planner = TimedPlanner {
+            inner: Box::new(decorators.planner(&clock, &continues)?) as Box<dyn Planner>,
+            clock: &world_clock,
+            planning_time: &spec.planning_time,
+        };
+        let execution = decorators.execution(planner, |_: &BeliefState| {})?;
+        let execution = execution
             .beginning_with(self.first_plan)
-            .on_belief(self.operator.listener())
-            .with_preparer(BackgroundPreparer::new(spec, task, signal)?)
-            .with_planner(TimedPlanner {
-                inner: planner,
-                clock: &world_clock,
-                planning_time: &spec.planning_time,
-            })
             .recorded_by(recorder);
-        execute(request, &mut world, watcher)
-    }
-}
-
-/// Returns a callback that passes the belief state to both callbacks.
-pub(crate) fn both(
-    mut one: impl FnMut(&BeliefState) + Send,
-    mut other: impl FnMut(&BeliefState) + Send,
-) -> impl FnMut(&BeliefState) + Send {
-    move |belief| {
-        one(belief);
-        other(belief);
-    }
-}
-
-/// Recorder that passes entries on, then shows them to viewers.
-pub(crate) struct ViewedRecorder<'a, R> {
-    inner: R,
-    task: Arc<Task>,
-    buffer: Option<TraceBuffer>,
-    observer: Option<EntryObserver<'a>>,
-}
-
-impl<'a, R: Recorder> ViewedRecorder<'a, R> {
-    pub(crate) fn new(
-        inner: R,
-        task: &Arc<Task>,
-        buffer: Option<TraceBuffer>,
-        observer: Option<EntryObserver<'a>>,
-    ) -> Self {
-        Self {
-            inner,
-            task: Arc::clone(task),
-            buffer,
-            observer,
-        }
-    }
-}
-
-impl<R: Recorder> Recorder for ViewedRecorder<'_, R> {
-    fn record(&mut self, entry: &Entry<'_>) {
-        self.inner.record(entry);
-        if let Some(buffer) = &self.buffer {
-            buffer.add(&format!("{}\n", Line::of(&self.task, entry).text()));
-        }
-        if let Some(observer) = &mut self.observer {
-            observer(entry);
-        }
-    }
-
-    fn commit(&mut self) {
-        self.inner.commit();
-    }
-
-    fn begin_anew(&mut self, stand: &dyn Fn() -> RunSnapshot) -> bool {
-        self.inner.begin_anew(stand)
+        execute(self.inputs, execution, &mut world, watcher)
     }
 }
 

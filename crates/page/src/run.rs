@@ -18,6 +18,8 @@ use elbowroom::pddl;
 use elbowroom::report::decimal::nearest;
 use elbowroom::report::schema::{ObservationLine, ReasonLine, ReportLine};
 use elbowroom::report::trace::{Line, Stored};
+use elbowroom::sim::WorldModel;
+use elbowroom::text::Source;
 
 use crate::document::{Chart, Document, Mark, Section, Series, Table, Text, Texts, Tone, Verdict};
 use crate::lanes::{Lanes, Occupant, lanes};
@@ -157,8 +159,8 @@ pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec, record: Record)
 /// Returns a table of the durations and failures that the believed world predicts, and those observed; `None` if the run
 /// has no believed world, or no action has ended.
 fn predictions(stored: &Stored, spec: &RunSpec, task: &Task) -> Option<Section> {
-    spec.believed.as_ref()?;
-    let world = spec.beliefs(task.problem()).ok()??;
+    let believed = Source::new("world", spec.believed.as_deref()?);
+    let world = WorldModel::read(believed, task.problem()).ok()?;
     let records = records::of_trace(stored);
     let predictions = predictions_for(&records, &world);
     let ended = predictions.iter().filter(|(_, it)| it.ended > 0);

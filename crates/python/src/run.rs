@@ -3,10 +3,8 @@
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, PoisonError};
 
-use elbowroom::answers::RunRequest;
 use elbowroom::answers::run::{RunOutcome, run as execute, simulate};
-use elbowroom::execute::{EMBEDDED, RunSpec, check_vary};
-use elbowroom::execution::NoRecord;
+use elbowroom::execute::{EMBEDDED, Execution, RunInputs, RunSpec, WorldNames, check_vary};
 use elbowroom::execution::executors::EXECUTORS;
 use elbowroom::model;
 use pyo3::prelude::*;
@@ -63,12 +61,13 @@ pub(crate) fn run(
         let raised = Raised::default();
         let task = problem.with_epsilon_of(&spec);
         let first = plan.map(|plan| problem.time_triggered(plan)).transpose()?;
-        let mut request = RunRequest::new(&spec, &task).beginning_with(first);
+        let inputs = RunInputs::of(spec, task, &WorldNames::default())?;
+        let mut execution = inputs.execution()?.beginning_with(first);
         if let Some(callable) = planner {
             let planner = problem.python_planner(callable, watch.flag(), &raised);
-            request = request.with_planner(planner);
+            execution = execution.with_planner(planner);
         }
-        problem.executed(request, world, &raised, has_trace, watch)
+        problem.executed((&inputs, execution), world, &raised, has_trace, watch)
     })?;
     let raised = raised.map(|error| error.into_value(py).into_any());
     Ok((answer, trace, is_interrupted, raised))
@@ -93,28 +92,28 @@ impl Task {
 
     fn executed(
         &self,
-        request: RunRequest<'_>,
+        (inputs, execution): (&RunInputs, Execution<'_>),
         world: Option<Py<PyAny>>,
         raised: &Raised,
         has_trace: bool,
         mut watch: ProgressObserver,
     ) -> Result<Outcome, CallError> {
         let tape = if has_trace {
-            Some(TraceText::of(request.task, request.spec)?)
+            Some(TraceText::of(inputs.task(), inputs.spec())?)
         } else {
             None
         };
-        let request = match tape.clone() {
-            Some(tape) => request.recorded_by(tape),
-            None => request.recorded_by(NoRecord),
+        let execution = match tape.clone() {
+            Some(tape) => execution.recorded_by(tape),
+            None => execution,
         };
         let (outcome, by_world) = match world {
             Some(adapter) => {
                 let mut world = PyWorld::new(adapter, &self.task, watch.flag());
-                let outcome = execute(request, &mut world, &mut watch)?;
+                let outcome = execute(inputs, execution, &mut world, &mut watch)?;
                 (outcome, world.raised)
             }
-            None => (simulate(request, &mut watch)?, None),
+            None => (simulate(inputs, execution, &mut watch)?, None),
         };
         let RunOutcome { answer, .. } = outcome;
         let by_planner = raised.lock().unwrap_or_else(PoisonError::into_inner).take();

@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use elbowroom::answers::RunAnswer;
+use elbowroom::execute::{RunInputs, WorldNames};
 use elbowroom::execution::run::{Next, Run};
 use elbowroom::execution::{Command, Workers, WorldError};
 use elbowroom::model;
@@ -61,20 +62,20 @@ impl Stepper {
             let raised = Raised::default();
             let stop = Arc::new(AtomicBool::new(false));
             let is_stopped = Arc::clone(&stop);
-            let mut execution = spec
-                .execution(&task)?
+            let inputs = RunInputs::of(spec, task, &WorldNames::default())?;
+            let (spec, task) = (inputs.spec(), inputs.task());
+            let mut execution = inputs
+                .execution()?
                 .beginning_with(first)
                 .with_explanations();
             execution = execution.with_stop_check(move || is_stopped.load(Ordering::SeqCst));
             execution = if let Some(callable) = planner {
                 execution.with_planner(problem.python_planner(callable, Arc::clone(&stop), &raised))
             } else {
-                let model = spec.beliefs(task.problem());
-                let model = model.map_err(elbowroom::execute::SpecError::World)?;
-                execution.with_planner(spec.planner_for(&task, model.as_ref(), NO_CLOCK, ALWAYS)?)
+                execution.with_planner(inputs.planner(NO_CLOCK, ALWAYS)?)
             };
             let tape = if has_trace {
-                Some(TraceText::of(&task, &spec)?)
+                Some(TraceText::of(task, spec)?)
             } else {
                 None
             };
@@ -85,7 +86,7 @@ impl Stepper {
             Ok(Self {
                 run: Mutex::new(run),
                 workers: Mutex::new(workers),
-                task,
+                task: Arc::clone(task),
                 tape,
                 raised,
                 stop,

@@ -299,6 +299,30 @@ impl<'a> Execution<'a> {
         Self { recorder, ..self }
     }
 
+    /// Replaces the recorder by a decorator of it.
+    pub fn map_recorder(
+        self,
+        decorate: impl FnOnce(Box<dyn Recorder + 'a>) -> Box<dyn Recorder + 'a>,
+    ) -> Self {
+        let recorder = decorate(self.recorder);
+        Self { recorder, ..self }
+    }
+
+    /// Returns `true` if a planner was set.
+    pub fn has_planner(&self) -> bool {
+        self.planner.is_some()
+    }
+
+    /// Returns the state from which the run is resumed, if any.
+    pub fn snapshot(&self) -> Option<&RunSnapshot> {
+        self.snapshot.as_ref()
+    }
+
+    /// Returns the first plan, if it was set.
+    pub fn first_plan(&self) -> Option<&TimeTriggeredPlan> {
+        self.plan.as_ref()
+    }
+
     /// See [`Run::with_stop_check`].
     pub fn with_stop_check(self, is_to_end: impl Fn() -> bool + Send + 'a) -> Self {
         let is_to_end = Box::new(is_to_end);

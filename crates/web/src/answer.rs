@@ -7,10 +7,10 @@ use elbowroom::answers::check::{CheckAnswer, CheckFinding, CheckRequest, Validat
 use elbowroom::answers::envelope::{EnvelopeFinding, EnvelopeRequest, Search, envelope};
 use elbowroom::answers::plan::{PlanFinding, PlanRequest, plan};
 use elbowroom::answers::region::{RegionFinding, RegionSettings, region};
-use elbowroom::answers::run::{RunRequest, simulate};
+use elbowroom::answers::run::simulate;
 use elbowroom::answers::stn::{StnFinding, StnRequest, stn};
 use elbowroom::envelope::{BestSettings, Guarantee};
-use elbowroom::execute::{RunSpec, SpecError};
+use elbowroom::execute::{RunInputs, RunSpec, SpecError, WorldNames};
 use elbowroom::execution::executors::{DEFAULT_EXECUTOR, EXECUTORS};
 use elbowroom::execution::run::{MissingPlan, TimeoutRule, Verdict};
 use elbowroom::model::validate::Settings;
@@ -346,16 +346,20 @@ fn execute_plan(
     };
     spec.check().map_err(spec_error)?;
     let task = Arc::new(read.task);
+    let inputs = RunInputs::of(spec, Arc::clone(&task), &WorldNames::default());
+    let inputs = inputs.map_err(spec_error)?;
     let mut trace = String::new();
     let mut sink = |line: &str| trace.push_str(line);
     let mut writer = TraceWriter::new(Arc::clone(&task), &mut sink);
-    let written = writer.header(&spec);
+    let written = writer.header(inputs.spec());
     written.map_err(|error| Failure::new(format!("cannot write the trace: {error}")))?;
-    let request = RunRequest::new(&spec, &task)
+    let execution = inputs
+        .execution()
+        .map_err(spec_error)?
         .beginning_with(first)
         .recorded_by(&mut writer);
-    let outcome =
-        simulate(request, &mut DeadlineObserver::start(clock, None)).map_err(spec_error)?;
+    let mut watcher = DeadlineObserver::start(clock, None);
+    let outcome = simulate(&inputs, execution, &mut watcher).map_err(spec_error)?;
     Ok(Reply {
         exit: match outcome.verdict() {
             Verdict::GoalReached => YES,
@@ -377,7 +381,9 @@ fn execute_plan(
 /// Converts a specification error. Errors of a world or of likelihoods refer to their texts.
 fn spec_error(error: SpecError) -> Failure {
     match error {
-        SpecError::World(wrong) | SpecError::Likelihoods(wrong) => wrong.into(),
+        SpecError::Problem(wrong) | SpecError::World(wrong) | SpecError::Likelihoods(wrong) => {
+            wrong.into()
+        }
         error => Failure::new(error),
     }
 }

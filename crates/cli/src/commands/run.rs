@@ -15,12 +15,10 @@ use std::sync::Arc;
 
 use elbowroom::RoundingRule;
 use elbowroom::answers::run::RunOutcome;
-use elbowroom::execute::{NamedText, RunSpec, SpecError, check_vary};
+use elbowroom::execute::{NamedText, RunInputs, RunSpec, WorldNames, check_vary};
 use elbowroom::execution::run::{MissingPlan, Verdict};
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
-use elbowroom::sim::WorldModel;
-use elbowroom::text::Source;
 use elbowroom_executive::Error;
 use elbowroom_executive::background_planner::BackgroundSettings;
 use elbowroom_executive::clock::Clock;
@@ -31,7 +29,7 @@ use elbowroom_executive::learning::{Learner, Learning};
 use elbowroom_executive::messages::escape_control;
 use elbowroom_executive::operator::OperatorInterface;
 use elbowroom_executive::process_world::{ProcessLimits, check_program};
-use elbowroom_executive::run::{JournaledOutcome, RunError, RunHost, RunInputs};
+use elbowroom_executive::run::{JournaledOutcome, RunAssembly, RunError, RunHost};
 use elbowroom_executive::trace_buffer::TraceBuffer;
 
 use crate::args::RunArgs;
@@ -77,18 +75,17 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
         since = at;
         Ok((&problem).into())
     };
-    let (mut spec, worlds) = spec::of(arguments, domain, problem)?;
+    let (mut spec, names) = spec::of(arguments, domain, problem)?;
     spec.is_interactive = arguments.token.is_some();
-    let (task, first) = checked(arguments, &mut spec, &worlds, output)?;
+    let (inputs, first) = checked(arguments, spec, &names, output)?;
     let interrupt = Interrupt::listen_with_world();
     let journal = journal(arguments, RESUME)?;
-    let page = Page::open(arguments, &spec, &task, &interrupt)?;
+    let page = Page::open(arguments, inputs.spec(), inputs.task(), &interrupt)?;
     let job = Job {
         journal,
         started: &|| (),
         clock: since,
-        spec: &spec,
-        task: &task,
+        inputs: &inputs,
         first_plan: first,
         interrupt: &interrupt,
         operator: &page.operator,
@@ -142,16 +139,16 @@ pub(super) fn access(
         .transpose()
 }
 
-/// Reads the problem of a specification, and the first plan if one is given. Errors in files are
+/// Reads the texts of a specification, and the first plan if one is given. Errors in files are
 /// reported before the run starts.
 pub(super) fn checked(
     arguments: &RunArgs,
-    spec: &mut RunSpec,
-    worlds: &[Source],
+    mut spec: RunSpec,
+    names: &WorldNames,
     output: &mut Output,
-) -> Result<(Arc<Task>, Option<TimeTriggeredPlan>), Failure> {
-    let task = task(spec, output)?;
-    spec::fit_model(arguments, spec, task.problem())?;
+) -> Result<(RunInputs, Option<TimeTriggeredPlan>), Failure> {
+    let task = Arc::new(task(&spec, output)?);
+    spec::fit_model(arguments, &mut spec, task.problem());
     let first = match arguments.plan() {
         Some(path) => Some(input::time_triggered(
             &task,
@@ -162,19 +159,15 @@ pub(super) fn checked(
         )?),
         None => None,
     };
-    spec.likelihoods(&task).map_err(contradiction_failure)?;
-    for source in worlds {
-        WorldModel::read(source, task.problem())
-            .map_err(|wrong| contradiction_failure(SpecError::World(wrong)))?;
-    }
-    check_vary(&task, &spec.vary).map_err(|error| {
+    let inputs = RunInputs::of(spec, task, names).map_err(contradiction_failure)?;
+    check_vary(inputs.task(), &inputs.spec().vary).map_err(|error| {
         Failure::new(
             error,
             "`elbowroom help envelope` lists the quantities for --vary",
         )
     })?;
-    spec.check().map_err(contradiction_failure)?;
-    Ok((Arc::new(task), first))
+    inputs.spec().check().map_err(contradiction_failure)?;
+    Ok((inputs, first))
 }
 
 fn show(
@@ -319,8 +312,7 @@ impl RunHost for CommandHost<'_> {
 
 /// Everything that a run needs except the world.
 pub(super) struct Job<'a> {
-    pub(super) spec: &'a RunSpec,
-    pub(super) task: &'a Arc<Task>,
+    pub(super) inputs: &'a RunInputs,
     pub(super) first_plan: Option<TimeTriggeredPlan>,
     pub(super) interrupt: &'a Interrupt,
     pub(super) operator: &'a OperatorInterface,
@@ -335,7 +327,7 @@ pub(super) struct Job<'a> {
 impl Job<'_> {
     /// Executes the run of the arguments, and returns its exit code.
     pub(super) fn execute(self, arguments: &RunArgs, output: &mut Output) -> Answer {
-        let (spec, interrupt) = (self.spec, self.interrupt);
+        let (spec, interrupt) = (self.inputs.spec(), self.interrupt);
         let mut line = ProgressLine::new();
         let journal = arguments.journal.as_deref();
         let learning = journal
@@ -343,9 +335,8 @@ impl Job<'_> {
             .transpose()?
             .flatten();
         let mut learns = learning.as_ref().map(Learning::observer);
-        let inputs = RunInputs {
-            spec,
-            task: self.task,
+        let run = RunAssembly {
+            inputs: self.inputs,
             first_plan: self.first_plan,
             embedded: None,
             operator: self.operator,
@@ -369,7 +360,7 @@ impl Job<'_> {
         };
         let mut watcher = Stopwatch::start(interrupt);
         if let Some(file) = self.journal {
-            let outcome = inputs.execute_journaled(file, &host, &mut watcher);
+            let outcome = run.execute_journaled(file, &host, &mut watcher);
             if let Some(learning) = learning {
                 learning.finish();
             }
@@ -377,7 +368,7 @@ impl Job<'_> {
             return print_outcome((arguments, spec), outcome, output);
         }
         let mut file = TraceFile::open(arguments.trace.as_deref())?;
-        let outcome = inputs.execute(&mut |line| file.write(line), &host, &mut watcher);
+        let outcome = run.execute(&mut |line| file.write(line), &host, &mut watcher);
         let outcome = host.close(outcome).map_err(failure)?;
         let is_valid = outcome.answer.invalid.is_empty();
         let trace = (!is_valid).then(|| file.of_invalid_run()).flatten();

@@ -3,7 +3,7 @@
 use std::cell::OnceCell;
 use std::sync::Arc;
 
-use elbowroom::execute::{NamedText, RunSpec, SpecError};
+use elbowroom::execute::{NamedText, RunInputs, RunSpec, SpecError, WorldNames};
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 use elbowroom::pddl::{self, Source};
@@ -66,10 +66,10 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
             text: String::new(),
         }),
     };
-    let (mut spec, worlds) = spec::of(&arguments.run, domain, problem)?;
+    let (mut spec, names) = spec::of(&arguments.run, domain, problem)?;
     configure_executive(&mut spec, arguments);
     let given = if arguments.run.problem.is_some() {
-        Some(checked(&arguments.run, &mut spec, &worlds, output)?)
+        Some(checked(&arguments.run, spec.clone(), &names, output)?)
     } else {
         check_domain(&domain_text)?;
         spec.check().map_err(spec::contradiction_failure)?;
@@ -79,19 +79,19 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
     let journal =
         journal.map(|file| file.with_rotation(Some(segments(arguments)), &output::warnings()));
     let router = open(arguments, &interrupt, &domain_text)?;
-    let (task, first, client) = if let Some((task, first)) = given {
-        (task, first, None)
+    let (inputs, first, client) = if let Some((inputs, first)) = given {
+        (inputs, first, None)
     } else {
         announce(arguments, &router);
-        let of = (&mut spec, worlds.as_slice());
-        let Some(((task, first), at, client)) = await_problem(&router, arguments, of, output)
+        let of = (&spec, &names);
+        let Some(((inputs, first), at, client)) = await_problem(&router, arguments, of, output)
         else {
             // The executive was stopped before it received a problem.
             router.close();
             return Ok(Exit::Yes);
         };
         since = at;
-        (task, first, Some(client))
+        (inputs, first, Some(client))
     };
     let started = || {
         if let Some(client) = &client {
@@ -99,15 +99,14 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
         }
     };
     let answer = router
-        .begin_run(&spec, &task)
+        .begin_run(inputs.spec(), inputs.task())
         .map_err(Failure::from)
         .and_then(|operator| {
             if client.is_none() {
                 announce(arguments, &router);
             }
             let job = Job {
-                spec: &spec,
-                task: &task,
+                inputs: &inputs,
                 first_plan: first,
                 interrupt: &interrupt,
                 operator: &operator,
@@ -124,15 +123,15 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
     interrupt_as_success(answer)
 }
 
-/// A problem, and its first plan if one is given.
-type InitialRun = (Arc<Task>, Option<TimeTriggeredPlan>);
+/// The inputs of a run, and its first plan if one is given.
+type InitialRun = (RunInputs, Option<TimeTriggeredPlan>);
 
 /// Waits for a problem that can be executed. Rejects other problems with the reason. Returns `None`
 /// if the executive is stopped before.
 fn await_problem(
     router: &ApiRouter,
     arguments: &ServeArgs,
-    (spec, worlds): (&mut RunSpec, &[Source]),
+    (spec, names): (&RunSpec, &WorldNames),
     output: &mut Output,
 ) -> Option<(InitialRun, Option<Clock>, Client)> {
     let interrupt = Interrupt::listen_with_world();
@@ -141,8 +140,11 @@ fn await_problem(
         let given = Source::new(SUBMITTED_PROBLEM, text);
         let begun = with_calendar(arguments.calendar(), &spec.domain, given, output).and_then(
             |(problem, at)| {
-                spec.problem = (&problem).into();
-                Ok((checked(&arguments.run, spec, worlds, output)?, at))
+                let spec = RunSpec {
+                    problem: (&problem).into(),
+                    ..spec.clone()
+                };
+                Ok((checked(&arguments.run, spec, names, output)?, at))
             },
         );
         match begun {

@@ -1,6 +1,7 @@
 //! Specification of a run as data: [`RunSpec`].
 
 mod assembly;
+mod error;
 mod text_form;
 
 use std::sync::Arc;
@@ -22,7 +23,8 @@ use crate::pipeline;
 pub(crate) use text_form::{as_text, listed};
 use text_form::{positive, required};
 
-pub use assembly::{AdversaryError, FirstPlanError, SpecError};
+pub use assembly::{RunInputs, WorldNames};
+pub use error::{AdversaryError, FirstPlanError, SpecError};
 
 /// Name for a run without a planner.
 pub const NO_PLANNER: &str = "none";
@@ -303,9 +305,9 @@ impl RunSpec {
     ///
     /// # Errors
     /// When the world file cannot be read.
-    pub fn beliefs(&self, problem: &Problem) -> Result<Option<WorldModel>, Diagnostics> {
+    fn beliefs(&self, problem: &Problem, name: &str) -> Result<Option<WorldModel>, Diagnostics> {
         match self.believed_world() {
-            Some(text) => read_world(text, problem).map(Some),
+            Some(text) => read_world(name, text, problem).map(Some),
             None if self.world_process.is_some() => Ok(None),
             None => Ok(Some(WorldModel::without_deviations())),
         }
@@ -315,10 +317,10 @@ impl RunSpec {
     ///
     /// # Errors
     /// When the world file cannot be read.
-    pub fn simulation(&self, problem: &Problem) -> Result<Option<WorldModel>, Diagnostics> {
+    fn simulation(&self, problem: &Problem, name: &str) -> Result<Option<WorldModel>, Diagnostics> {
         match &self.world {
             _ if self.world_process.is_some() => Ok(None),
-            Some(text) => read_world(text, problem).map(Some),
+            Some(text) => read_world(name, text, problem).map(Some),
             None => Ok(Some(WorldModel::without_deviations())),
         }
     }
@@ -327,7 +329,7 @@ impl RunSpec {
     ///
     /// # Errors
     /// When the likelihood file cannot be read.
-    pub fn likelihoods(&self, task: &Task) -> Result<Arc<Likelihoods>, SpecError> {
+    fn likelihoods(&self, task: &Task) -> Result<Arc<Likelihoods>, SpecError> {
         let Some(file) = &self.likelihoods else {
             return Ok(Arc::new(Likelihoods::certain()));
         };
@@ -336,6 +338,6 @@ impl RunSpec {
     }
 }
 
-fn read_world(text: &str, problem: &Problem) -> Result<WorldModel, Diagnostics> {
-    WorldModel::read(Source::new("world", text), problem)
+fn read_world(name: &str, text: &str, problem: &Problem) -> Result<WorldModel, Diagnostics> {
+    WorldModel::read(Source::new(name, text), problem)
 }

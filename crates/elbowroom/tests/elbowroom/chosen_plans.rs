@@ -10,11 +10,11 @@ use elbowroom::answers::odds::{OddsFinding, OddsRequest, OddsSettings, odds};
 use elbowroom::answers::plan::{
     BestPlanRequest, PlanAim, PlanChoice, PlanFinding, PlanOutcome, PlanStop, PlanValue, best_plan,
 };
-use elbowroom::answers::run::{RunRequest, simulate};
+use elbowroom::answers::run::simulate;
 use elbowroom::answers::{NoObserver, Observer, StopRequest};
 use elbowroom::execute::{
     Candidates, Choice, Embedded, Execution, FirstPlan, Limits, NamedText, PlanSelector,
-    Replanning, Rollouts, RunSpec, Value, WorldKnowledge,
+    Replanning, Rollouts, RunInputs, RunSpec, Value, WorldKnowledge,
 };
 use elbowroom::execution::run::{PlanningTime, RunSettings, Verdict};
 use elbowroom::execution::{Entry, Planner, Recorder};
@@ -293,11 +293,10 @@ impl Recorder for First {
 }
 
 fn first_plan_of_a_run(spec: &RunSpec) -> (Vec<String>, Option<String>) {
-    let (domain, problem) = (spec.domain.source(), spec.problem.source());
-    let task = Arc::new(Task::new(pddl::read_problem(&domain, &problem).unwrap().0));
+    let (inputs, _) = RunInputs::read(spec.clone()).unwrap();
     let first = First::default();
-    let request = RunRequest::new(spec, &task).recorded_by(first.clone());
-    let outcome = simulate(request, &mut NoObserver).unwrap();
+    let execution = inputs.execution().unwrap().recorded_by(first.clone());
+    let outcome = simulate(&inputs, execution, &mut NoObserver).unwrap();
     let first = first.0.lock().unwrap().take().unwrap();
     assert_eq!(outcome.answer.first_plan, first.1);
     first

@@ -8,9 +8,9 @@ use elbowroom::answers::learn::{
     ConformalBox, ConformalRequest, LearnAnswer, LearnRequest, LearntDurations, Log, Settings,
     Verdict, learn,
 };
-use elbowroom::answers::run::{RunRequest, run as answer_run, simulate};
+use elbowroom::answers::run::{run as answer_run, simulate};
 use elbowroom::envelope::Guarantee;
-use elbowroom::execute::{NamedText, RunSpec};
+use elbowroom::execute::{NamedText, RunInputs, RunSpec, WorldNames};
 use elbowroom::execution::run::{TimeoutRule, Verdict as Ended};
 use elbowroom::execution::{Command, Observation, TimeAdvance, World, WorldError};
 use elbowroom::learning::records::{Outcome, Record, of_trace};
@@ -65,10 +65,10 @@ fn run(world: &str, seed: u64) -> (String, bool) {
     let mut sink = |line: &str| text.push_str(line);
     let mut writer = TraceWriter::new(Arc::clone(&task), &mut sink);
     writer.header(&spec).expect("texts and numbers");
-    let request = RunRequest::new(&spec, &task)
-        .beginning_with(plan)
-        .recorded_by(&mut writer);
-    let outcome = simulate(request, &mut NoObserver).expect("a world");
+    let inputs = RunInputs::of(spec, Arc::clone(&task), &WorldNames::default()).expect("a world");
+    let execution = inputs.execution().expect("a consistent specification");
+    let execution = execution.beginning_with(plan).recorded_by(&mut writer);
+    let outcome = simulate(&inputs, execution, &mut NoObserver).expect("a world");
     let is_done = *outcome.verdict() == Ended::GoalReached;
     drop(writer);
     (text, is_done)
@@ -539,15 +539,12 @@ fn reports_with_corrected_times_count() {
     let mut sink = |line: &str| text.push_str(line);
     let mut writer = TraceWriter::new(Arc::clone(&task), &mut sink);
     writer.header(&spec).expect("texts and numbers");
-    let model = spec
-        .simulation(task.problem())
-        .expect("a world")
-        .expect("a simulation");
-    let mut world = Early(model.world(&task, spec.seed));
-    let request = RunRequest::new(&spec, &task)
-        .beginning_with(plan)
-        .recorded_by(&mut writer);
-    answer_run(request, &mut world, &mut NoObserver).expect("a run");
+    let inputs = RunInputs::of(spec, Arc::clone(&task), &WorldNames::default()).expect("a world");
+    let model = inputs.simulation().expect("a simulation");
+    let mut world = Early(model.world(&task, inputs.spec().seed));
+    let execution = inputs.execution().expect("a consistent specification");
+    let execution = execution.beginning_with(plan).recorded_by(&mut writer);
+    answer_run(&inputs, execution, &mut world, &mut NoObserver).expect("a run");
     drop(writer);
     assert!(text.contains("taken as now"), "{text}");
     let records = of_trace(&Stored::read(&text).expect("a trace"));

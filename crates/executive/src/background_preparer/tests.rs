@@ -1,7 +1,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use elbowroom::execute::{Embedded, PlanPreparer, RunSpec};
+use elbowroom::execute::{Embedded, PlanPreparer, RunInputs, RunSpec, WorldNames};
 use elbowroom::execution::executors::ExecutorSpec;
 use elbowroom::execution::{
     PlanAnswer, PlanForm, Planner, PreparationRequest, PreparedPlan, Preparer,
@@ -57,14 +57,15 @@ fn background_preparation_equals_awaited_one() {
             now: &zero,
             need,
         };
-        let mut preparer =
-            BackgroundPreparer::new(&spec, &task, &signal).expect("it has no world file");
+        let inputs = RunInputs::of(spec, Arc::clone(&task), &WorldNames::default());
+        let inputs = inputs.expect("it has no world file");
+        let mut preparer = BackgroundPreparer::new(&inputs, &signal);
         assert!(preparer.begin(&wanted) && signal.is_awaited());
         signal.wait(Duration::from_secs(60));
         assert_eq!(signal.poll(), Some(Completion::PlanReady));
         wanted.now = &later;
         let aside = preparer.collect(&wanted).expect("it works");
-        let mut analyst = PlanPreparer::new(spec.envelopes());
+        let mut analyst = PlanPreparer::new(inputs.spec().envelopes());
         let waited_for = wanted.prepare_now(&mut analyst).expect("it works");
         assert_eq!(mission_text(&aside), mission_text(&waited_for), "{name}");
         assert_eq!(aside.now, later);

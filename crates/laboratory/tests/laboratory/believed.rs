@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use elbowroom::answers::NoObserver;
 use elbowroom::answers::learn::{LearnRequest, Log, Settings, learn};
-use elbowroom::answers::run::{RunRequest, simulate};
-use elbowroom::execute::{Candidates, Limits, NamedText, RunSpec};
+use elbowroom::answers::run::simulate;
+use elbowroom::execute::{Candidates, Limits, NamedText, RunInputs, RunSpec, WorldNames};
 use elbowroom::report::trace::TraceWriter;
 use elbowroom_laboratory::compare::{Experiment, Part, run};
 use elbowroom_model::{Situation, Task};
@@ -100,10 +100,12 @@ fn logs(experiment: &Experiment, count: u64, first: u64) -> Vec<Log> {
             let mut sink = |line: &str| text.push_str(line);
             let mut writer = TraceWriter::new(Arc::clone(&task), &mut sink);
             writer.header(&spec).expect("texts and numbers");
-            let request = RunRequest::new(&spec, &task)
-                .beginning_with(plan.clone())
-                .recorded_by(&mut writer);
-            simulate(request, &mut NoObserver).expect("a world");
+            let inputs = RunInputs::of(spec, Arc::clone(&task), &WorldNames::default());
+            let inputs = inputs.expect("a world");
+            let execution = inputs.execution().expect("a consistent specification");
+            let execution = execution.beginning_with(plan.clone());
+            let execution = execution.recorded_by(&mut writer);
+            simulate(&inputs, execution, &mut NoObserver).expect("a world");
             drop(writer);
             Log::read(&Source::new(format!("run {seed}"), text)).expect("a trace")
         });

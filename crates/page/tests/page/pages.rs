@@ -4,10 +4,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 use elbowroom::answers::Exact;
+use elbowroom::answers::NoObserver;
 use elbowroom::answers::envelope::{EnvelopeFinding, EnvelopeRequest, envelope};
 use elbowroom::answers::run::simulate;
-use elbowroom::answers::{NoObserver, RunRequest};
-use elbowroom::execute::{NamedText, RunSpec};
+use elbowroom::execute::{NamedText, RunInputs, RunSpec, WorldNames};
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 use elbowroom::pddl::{self, Source};
@@ -58,10 +58,10 @@ fn trace(case: &str, seed: u64) -> String {
     let mut sink = |line: &str| lines.push_str(line);
     let mut writer = TraceWriter::new(Arc::clone(&task), &mut sink);
     writer.header(&spec).expect("a header");
-    let request = RunRequest::new(&spec, &task)
-        .beginning_with(plan)
-        .recorded_by(&mut writer);
-    simulate(request, &mut NoObserver).expect("a run");
+    let inputs = RunInputs::of(spec, Arc::clone(&task), &WorldNames::default()).expect("texts");
+    let execution = inputs.execution().expect("a consistent specification");
+    let execution = execution.beginning_with(plan).recorded_by(&mut writer);
+    simulate(&inputs, execution, &mut NoObserver).expect("a run");
     lines
 }
 

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use elbowroom::answers::run::run as execute;
-use elbowroom::answers::{Observer, RunRequest, StopRequest};
-use elbowroom::execute::RunSpec;
+use elbowroom::answers::{Observer, StopRequest};
+use elbowroom::execute::{RunInputs, RunSpec, SpecError, WorldNames};
 use elbowroom::report::trace::{Line, Replay, ReplayPlanner, ReplayPreparer, ReplayWorld, Stored};
 use serde_json::{Value, json};
 
@@ -46,21 +46,21 @@ pub(super) fn run(path: &Path, as_json: bool, output: &mut Output) -> Answer {
         None
     };
     let mut replay = Replay::new(&stored, Arc::clone(&task));
-    let analyst = spec.analyst(task.problem());
-    let analyst = analyst.map_err(|error| unreadable(format!("line 1: {error}")))?;
-    let request = RunRequest::new(&spec, &task)
+    let unusable = |error: SpecError| unreadable(format!("line 1: {error}"));
+    let inputs = RunInputs::of(spec, Arc::clone(&task), &WorldNames::default());
+    let inputs = inputs.map_err(unusable)?;
+    let mut watch = StoredInterrupt(replay.interruption());
+    let execution = inputs
+        .execution()
+        .map_err(unusable)?
         .beginning_with(first)
         .resume_from(stand)
         .with_restarts(stored.restart_count())
         .with_planner(ReplayPlanner::new(&stored))
-        .with_preparer(ReplayPreparer(analyst));
-    let mut watch = StoredInterrupt(replay.interruption());
-    let outcome = execute(
-        request.recorded_by(&mut replay),
-        &mut ReplayWorld::new(&stored, &task),
-        &mut watch,
-    )
-    .map_err(|error| unreadable(format!("line 1: {error}")))?;
+        .with_preparer(ReplayPreparer(inputs.preparer()))
+        .recorded_by(&mut replay);
+    let mut world = ReplayWorld::new(&stored, &task);
+    let outcome = execute(&inputs, execution, &mut world, &mut watch).map_err(unusable)?;
     let (agreed, difference) = replay.outcome();
     if as_json {
         output.json(&json!({

@@ -4,7 +4,7 @@ use std::cell::OnceCell;
 use std::path::Path;
 use std::sync::Arc;
 
-use elbowroom::execute::RunSpec;
+use elbowroom::execute::{RunInputs, RunSpec, WorldNames};
 use elbowroom::model::Task;
 use elbowroom_executive::Error;
 use elbowroom_executive::journal::Segments;
@@ -13,6 +13,7 @@ use elbowroom_executive::resume::{InterruptedRun, JournaledRun, ResumeSettings};
 use serde_json::Value;
 
 use super::page::Page;
+use super::spec::contradiction_failure;
 use super::{CommandHost, background, failure, limits};
 use crate::args::RunArgs;
 use crate::exit::{Answer, Exit, Failure};
@@ -126,11 +127,13 @@ pub(in crate::commands) fn run(
     let interrupted = interrupted.with_threads(threads);
     let spec = interrupted.spec().clone();
     let task = Arc::new(super::task(&spec, output)?);
+    let inputs = RunInputs::of(spec, task, &WorldNames::default());
+    let inputs = inputs.map_err(contradiction_failure)?;
     let interrupt = Interrupt::listen_with_world();
     let learning = super::learning(arguments, path)?;
     let settings = ResumeSettings {
         embedded: None,
-        task: &task,
+        inputs: &inputs,
         background: background(arguments, &interrupt),
         limits: limits(arguments),
         observer: learning.as_ref().map(|it| Box::new(it.observer()) as _),
@@ -148,5 +151,5 @@ pub(in crate::commands) fn run(
         learning.finish();
     }
     let outcome = host.close(outcome).map_err(failure)?;
-    super::print_outcome((arguments, &spec), outcome, output)
+    super::print_outcome((arguments, inputs.spec()), outcome, output)
 }

@@ -5,13 +5,12 @@ use std::path::Path;
 use elbowroom::answers::learn::known_sections;
 use elbowroom::execute::{
     AdversaryError, AdversarySettings, FirstPlan, FirstPlanError, MOST_STATES, NamedText, RunSpec,
-    SpecError,
+    SpecError, WorldNames,
 };
 use elbowroom::execution::run::{PlanningTime, RunningRule};
 use elbowroom::model::Problem;
 use elbowroom::num::Rational;
 use elbowroom::plan::parametrize::ParametrizeError;
-use elbowroom::sim::WorldModel;
 use elbowroom::text::Source;
 use elbowroom_executive::learning::MODEL;
 use elbowroom_executive::messages::count_with_noun;
@@ -22,14 +21,14 @@ use crate::exit::Failure;
 use crate::input;
 use crate::output;
 
-/// Returns the specification of the arguments, and the world files, whose names appear in messages.
+/// Returns the specification of the arguments, and the names of the world files for messages.
 /// Files are read here. Errors in the arguments themselves are reported before files are read and
 /// `problem` is called.
 pub(in crate::commands) fn of(
     arguments: &RunArgs,
     domain: &Path,
     problem: impl FnOnce(&NamedText) -> Result<NamedText, Failure>,
-) -> Result<(RunSpec, Vec<Source>), Failure> {
+) -> Result<(RunSpec, WorldNames), Failure> {
     let empty = || NamedText {
         name: String::new(),
         text: String::new(),
@@ -76,7 +75,7 @@ pub(in crate::commands) fn of(
     if let Some(path) = &arguments.likelihoods {
         spec.likelihoods = Some((&input::source(path, "likelihoods")?).into());
     }
-    let mut worlds = Vec::new();
+    let mut names = WorldNames::default();
     if arguments.has_adversary() {
         if spec.realtime.is_some() && spec.has_plan {
             let what = "--world spoiler cannot run on a wall clock";
@@ -87,14 +86,12 @@ pub(in crate::commands) fn of(
     } else if let Some(path) = &arguments.world {
         let source = input::source(path, "world")?;
         spec.world = Some(source.text().to_owned());
-        worlds.push(source);
+        names.world = source.name().to_owned();
     }
     if let Some(path) = &arguments.believed {
         let source = read_believed_world(path, arguments.learn.as_deref())?;
         spec.believed = Some(source.text().to_owned());
-        if !path.is_dir() {
-            worlds.push(source);
-        }
+        names.believed = source.name().to_owned();
     }
     spec.problem = problem(&spec.domain)?;
     spec.first_plan = match arguments.first_plan_by {
@@ -104,7 +101,7 @@ pub(in crate::commands) fn of(
     };
     spec.plans_aside = spec.can_plan_in_background();
     spec.readies_aside = spec.plans_aside;
-    Ok((spec, worlds))
+    Ok((spec, names))
 }
 
 /// Reads the world file of `--believed`. In a folder of `--learn` it is the model. If there is no
@@ -130,28 +127,21 @@ fn read_believed_world(path: &Path, learn: Option<&Path>) -> Result<Source, Fail
 
 /// Removes sections of a learnt model that do not fit the problem, with a warning. Other world
 /// files are not changed.
-pub(super) fn fit_model(
-    arguments: &RunArgs,
-    spec: &mut RunSpec,
-    problem: &Problem,
-) -> Result<(), Failure> {
+pub(super) fn fit_model(arguments: &RunArgs, spec: &mut RunSpec, problem: &Problem) {
     let Some(folder) = arguments.believed.as_ref().filter(|it| it.is_dir()) else {
-        return Ok(());
+        return;
     };
-    let path = folder.join(MODEL).display().to_string();
     let model = spec.believed.as_deref().unwrap_or_default();
     let (model, left_out) = known_sections(model, problem);
     if left_out > 0 {
         let sections = count_with_noun(left_out, "section");
+        let path = folder.join(MODEL);
         output::warn(&format!(
-            "{path}: {sections} ignored, not applicable to this problem"
+            "{}: {sections} ignored, not applicable to this problem",
+            path.display()
         ));
     }
-    let source = Source::new(path, model.as_str());
-    let read = WorldModel::read(&source, problem);
-    read.map_err(|wrong| contradiction_failure(SpecError::World(wrong)))?;
     spec.believed = Some(model);
-    Ok(())
 }
 
 /// Returns the number of threads for a planner of this name. The default is one, because the robot
@@ -180,6 +170,7 @@ fn planning_time(arguments: &RunArgs) -> Result<PlanningTime, Failure> {
 /// Returns a failure with advice on contradictory arguments or files.
 pub(in crate::commands) fn contradiction_failure(error: SpecError) -> Failure {
     let hint = match &error {
+        SpecError::Problem(wrong) => return Failure::from(wrong.clone()),
         SpecError::World(wrong) => {
             return Failure::from(wrong.clone())
                 .with_default_advice("docs/formats/world.md describes world files");

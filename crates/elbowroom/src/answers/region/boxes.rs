@@ -54,8 +54,8 @@ pub(super) fn boxes(
     };
     let searches = [
         ("irr", irr),
-        ("least-slack", best(Objective::LeastSlack)),
-        ("widths", best(Objective::Widths)),
+        (Objective::LeastSlack.name(), best(Objective::LeastSlack)),
+        (Objective::Widths.name(), best(Objective::Widths)),
     ];
     let mut boxes = Vec::new();
     for (name, search) in searches {

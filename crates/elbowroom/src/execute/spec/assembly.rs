@@ -4,14 +4,12 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use elbowroom_envelope::Objective;
-use elbowroom_execution::executors::ExecutorSpec;
 use elbowroom_execution::run::PlanningTime;
 use elbowroom_execution::{
-    ActionValues, NoPlanner, PlanComparator, PlanForm, Planner, PrepareError, Preparer, World,
+    ActionValues, NoPlanner, PlanComparator, PlanForm, Planner, Preparer, World,
 };
-use elbowroom_external::{self as external, PlannerError};
+use elbowroom_external as external;
 use elbowroom_mdp::Settings;
-use elbowroom_model::problem::Problem;
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::{Rational, work};
 use elbowroom_planner::embedded;
@@ -19,125 +17,129 @@ use elbowroom_probability::Likelihoods;
 use elbowroom_selection::timeouts::unknown_action;
 use elbowroom_selection::{CERTIFICATE_WORK, action_values, certificate_work};
 use elbowroom_sim::{ControlledWorld, SimWorld, WorldModel};
-use elbowroom_text::Diagnostics;
+use elbowroom_text::Diagnostic;
 
-use super::{EMBEDDED, NO_PLANNER, RunSpec};
+use super::{AdversaryError, EMBEDDED, FirstPlanError, NO_PLANNER, RunSpec, SpecError};
 use crate::execute::{
     AdversarialWorld, Embedded, Execution, External, FirstPlan, MostProbablePlanner, PlanPreparer,
     PlanSelector, Replanning, RolloutPolicy, Rollouts, SelectingPlanner, SharedRolloutPolicy,
     WorldKnowledge, planning_work,
 };
-use crate::{BoxTextError, DistributionError, parse_box, pipeline};
+use crate::{DistributionError, parse_box, pipeline};
 
 /// The time limit of another planner for its first plan.
 const FIRST_PLAN_TIME_LIMIT: Duration = Duration::from_secs(60);
 
-/// A specification that cannot be run.
-#[derive(Clone, Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum SpecError {
-    /// The world file cannot be read.
-    #[error("{0}")]
-    World(Diagnostics),
-    /// Another planner is unknown, or cannot be used with these settings.
-    #[error(transparent)]
-    Planner(#[from] PlannerError),
-    /// The likelihood file cannot be read.
-    #[error("{0}")]
-    Likelihoods(Diagnostics),
-    /// The problem has a part that executors do not support.
-    #[error(
-        "plans cannot be executed here: the domain has {0}, which executors do not support yet"
-    )]
-    UnsupportedFeature(&'static str),
-    /// The time-outs name an action that the problem does not have.
-    #[error("{0}")]
-    Timeout(String),
-    /// The executor compares plans in the world of a world file, but there is none.
-    #[error("`{0}` needs a model of the world")]
-    NeedsWorld(ExecutorSpec),
-    /// The executor compares plans of the embedded planner, but another planner is given.
-    #[error("`{0}` needs the embedded planner, because it chooses among its plans")]
-    NeedsEmbedded(ExecutorSpec),
-    /// Self-overlap was allowed, but the plans come from another planner, or there is no planner.
-    #[error(
-        "only plans of the embedded planner can be allowed to have self-overlap, not plans of \
-             `{0}`"
-    )]
-    SelfOverlap(String),
-    /// The likeliest first plan was requested, but it cannot be chosen.
-    #[error("the likeliest first plan cannot be chosen: {0}")]
-    FirstPlan(FirstPlanError),
-    /// A time limit was set for a planner that has none.
-    #[error("`{0}` has no time limit for better plans; the embedded planner is limited by states")]
-    NoTimeLimit(String),
-    /// The most likely box was requested, but there is no model of the world.
-    #[error(transparent)]
-    Distribution(#[from] DistributionError),
-    /// A simulation was requested, but the world is a process.
-    #[error("the world is a process; it cannot be simulated")]
-    Process,
-    /// The adversarial world cannot be created.
-    #[error(transparent)]
-    Adversary(#[from] AdversaryError),
+/// The inputs of a run: its specification, with the problem, worlds and likelihoods read from its texts, each once.
+#[derive(Clone, Debug)]
+pub struct RunInputs {
+    spec: RunSpec,
+    task: Arc<Task>,
+    /// The simulated world; `None` if the world is a process.
+    simulation: Option<WorldModel>,
+    /// The world that the executor believes, if any.
+    beliefs: Option<WorldModel>,
+    likelihoods: Arc<Likelihoods>,
 }
 
-/// Reasons why the first plan cannot be chosen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum FirstPlanError {
-    /// A plan was given.
-    #[error("a plan is given")]
-    Given,
-    /// Another planner was named, whose plan is used without a choice.
-    #[error("only plans of the embedded planner can be compared")]
-    ExternalPlanner,
-    /// There is no world file, and there are no likelihoods.
-    #[error("there is no model of the world")]
-    NoWorldKnowledge,
-    /// Goals are given later.
-    #[error("the goals are given later")]
-    Persistent,
+/// Names of world files in messages.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct WorldNames {
+    /// The name of the simulated world.
+    pub world: String,
+    /// The name of the believed world.
+    pub believed: String,
 }
 
-/// Reasons why an adversarial world cannot be created.
-#[derive(Clone, Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum AdversaryError {
-    /// There is no plan.
-    #[error("the adversary needs a plan")]
-    NoPlan,
-    /// The plan cannot be prepared.
-    #[error(transparent)]
-    Unprepared(#[from] PrepareError),
-    /// The box is not one of this plan.
-    #[error(transparent)]
-    Box(#[from] BoxTextError),
-    /// The plan has no envelope, and no box was given.
-    #[error("the plan has no envelope from which the adversary could choose values")]
-    NoEnvelope,
-    /// The plan's constraints are inconsistent.
-    #[error("no values in this box satisfy the plan's constraints")]
-    Empty,
+impl Default for WorldNames {
+    /// The texts of specifications have no names.
+    fn default() -> Self {
+        let name = || "world".to_owned();
+        Self {
+            world: name(),
+            believed: name(),
+        }
+    }
 }
 
-impl RunSpec {
-    /// Returns the world of the specification, unless it is a process: a simulation of `model`, or
-    /// an adversary of `plan`.
+impl RunInputs {
+    /// Reads the problem and the other texts of a specification. Returns the inputs with the warnings.
     ///
     /// # Errors
-    /// When there is no plan for the adversary, or the plan does not match the box.
-    pub fn world<'m>(
+    /// When a text cannot be read.
+    pub fn read(spec: RunSpec) -> Result<(Self, Vec<Diagnostic>), SpecError> {
+        let read = elbowroom_pddl::read_problem(&spec.domain.source(), &spec.problem.source());
+        let (problem, warnings) = read.map_err(SpecError::Problem)?;
+        let task = Task::new(problem).with_epsilon(spec.epsilon.clone());
+        Ok((
+            Self::of(spec, Arc::new(task), &WorldNames::default())?,
+            warnings,
+        ))
+    }
+
+    /// Reads the likelihoods and the worlds of a specification, whose problem was read already. `names` are those of
+    /// the world files, for messages.
+    ///
+    /// # Errors
+    /// When a text cannot be read.
+    pub fn of(spec: RunSpec, task: Arc<Task>, names: &WorldNames) -> Result<Self, SpecError> {
+        let problem = task.problem();
+        let likelihoods = spec.likelihoods(&task)?;
+        let simulation = spec.simulation(problem, &names.world);
+        let simulation = simulation.map_err(SpecError::World)?;
+        let beliefs = match (&spec.believed, &simulation) {
+            (None, Some(simulation)) => Some(simulation.clone()),
+            _ => spec
+                .beliefs(problem, &names.believed)
+                .map_err(SpecError::World)?,
+        };
+        Ok(Self {
+            spec,
+            task,
+            simulation,
+            beliefs,
+            likelihoods,
+        })
+    }
+
+    /// Returns the specification.
+    pub fn spec(&self) -> &RunSpec {
+        &self.spec
+    }
+
+    /// Returns the problem, with the ε of the specification.
+    pub fn task(&self) -> &Arc<Task> {
+        &self.task
+    }
+
+    /// Returns the model of the simulated world; `None` if the world is a process.
+    pub fn simulation(&self) -> Option<&WorldModel> {
+        self.simulation.as_ref()
+    }
+
+    /// Returns the world of the specification: a simulation, or an adversary of `plan`.
+    ///
+    /// # Errors
+    /// When the world is a process, there is no plan for the adversary, or the plan does not match the box.
+    pub fn world(
+        &self,
+        plan: Option<&TimeTriggeredPlan>,
+    ) -> Result<Box<dyn World + '_>, SpecError> {
+        let model = self.simulation.as_ref().ok_or(SpecError::Process)?;
+        Ok(self.world_of(model, plan)?)
+    }
+
+    fn world_of<'m>(
         &self,
         model: &'m WorldModel,
-        task: &Arc<Task>,
         plan: Option<&TimeTriggeredPlan>,
     ) -> Result<Box<dyn World + 'm>, AdversaryError> {
-        let Some(spoiler) = &self.spoiler else {
-            return Ok(model.world(task, self.seed));
+        let task = &self.task;
+        let Some(spoiler) = &self.spec.spoiler else {
+            return Ok(model.world(task, self.spec.seed));
         };
         let plan = plan.ok_or(AdversaryError::NoPlan)?;
-        let mut settings = self.envelopes();
+        let mut settings = self.spec.envelopes();
         settings.world = Some(Arc::new(model.clone()));
         let mut analyst = PlanPreparer::new(settings);
         let prepared = analyst.prepare(task, plan, PlanForm::OpenNetwork)?;
@@ -152,64 +154,36 @@ impl RunSpec {
             &prepared.plan.plan,
             &network,
             &prepared.nominal,
-            &self.timeout,
+            &self.spec.timeout,
         );
-        let sim = SimWorld::new(Arc::clone(task), model, self.seed);
+        let sim = SimWorld::new(Arc::clone(task), model, self.spec.seed);
         Ok(Box::new(ControlledWorld::new(sim, spoiling)))
     }
 
-    /// Returns the planner that [`Self::planner`] names, with the limits of the run, and with
-    /// `clock` and `goes_on` as in [`Embedded`]. For executors that search for likelier plans, it
-    /// returns the likeliest plan in the world of `model`. The embedded planner's first plan is
-    /// chosen by [`Self::first_plan`]; other planners return their only plan.
+    /// Returns the planner of the run, with `clock` and `goes_on` as in [`Embedded`]. The embedded planner's first plan
+    /// is chosen by [`RunSpec::first_plan`]; other planners return their only plan.
     ///
     /// # Errors
-    /// When the planner is unknown, or has no such limit, or the likelihood file cannot be read.
-    pub fn planner_for<'a>(
+    /// When the planner is unknown, or has no such limit.
+    pub fn planner<'a>(
         &self,
-        task: &Task,
-        model: Option<&WorldModel>,
         clock: &'a (dyn Fn() -> Rational + Sync),
         goes_on: &'a (dyn Fn() -> bool + Sync),
     ) -> Result<Box<dyn Planner + 'a>, SpecError> {
-        let embedded = Embedded {
-            clock: Some(clock),
-            may_continue: Some(goes_on),
-            ..self.embedded()
-        };
-        let planner: Box<dyn Planner + 'a> = match self.planner_choice()? {
-            PlannerChoice::Disabled => return Ok(Box::new(NoPlanner)),
-            PlannerChoice::Embedded => match model.filter(|_| self.executor.needs_odds()) {
-                None => Box::new(embedded),
-                Some(model) => {
-                    let time = self.expected_planning_time();
-                    Box::new(MostProbablePlanner::new(model.clone(), embedded, time))
-                }
-            },
-            PlannerChoice::External(planner) => {
-                let given = self.planner_time.as_ref();
-                let limit = given.map(|time| Duration::from_secs_f64(time.to_f64().min(1e9)));
-                return Ok(Box::new(External {
-                    planner: *planner,
-                    domain: self.domain.source(),
-                    problem: self.problem.source(),
-                    settings: external::Settings {
-                        time_limit: Some(limit.unwrap_or(FIRST_PLAN_TIME_LIMIT)),
-                        ..external::Settings::default()
-                    },
-                    stops_at_first_plan: limit.is_none(),
-                    may_continue: goes_on,
-                }));
-            }
-        };
-        let Some(known) = self.first_plan_knowledge(task, model)? else {
+        let planner = self
+            .spec
+            .planner_of_new_plans(self.beliefs.as_ref(), clock, goes_on)?;
+        let is_embedded = matches!(self.spec.planner_choice()?, PlannerChoice::Embedded);
+        let known = self.first_plan_knowledge().filter(|_| is_embedded);
+        let Some(known) = known else {
             return Ok(planner);
         };
         let chooser = PlanSelector {
-            settings: self.embedded().settings,
-            most_states: self.planner_states,
-            improve_states: self.improve_states,
+            settings: self.spec.embedded().settings,
+            most_states: self.spec.planner_states,
+            improve_states: self.spec.improve_states,
             work: self
+                .spec
                 .planning_budget
                 .as_ref()
                 .map_or(u64::MAX, planning_work),
@@ -219,7 +193,7 @@ impl RunSpec {
         Ok(Box::new(SelectingPlanner {
             inner: planner,
             chooser: Some(chooser),
-            latest_start: self.expected_planning_time(),
+            latest_start: self.spec.expected_planning_time(),
             clock,
         }))
     }
@@ -227,63 +201,124 @@ impl RunSpec {
     /// Returns the model of the world for the choice of the first plan. `None` if the planner's own
     /// plan is used: because it was requested, because there is no model, or because goals are
     /// given later.
-    fn first_plan_knowledge(
-        &self,
-        task: &Task,
-        model: Option<&WorldModel>,
-    ) -> Result<Option<WorldKnowledge>, SpecError> {
-        if self.first_plan.is_shortest() || self.has_plan || self.is_persistent {
-            return Ok(None);
+    fn first_plan_knowledge(&self) -> Option<WorldKnowledge> {
+        let spec = &self.spec;
+        if spec.first_plan.is_shortest() || spec.has_plan || spec.is_persistent {
+            return None;
         }
-        let likelihoods = self.likelihoods(task)?;
-        if let Some(world) = model.filter(|_| self.believed_world().is_some()) {
-            return Ok(Some(WorldKnowledge::World(
-                self.rollouts(world, likelihoods),
-            )));
+        if let Some(rollouts) = self.rollouts() {
+            return Some(WorldKnowledge::World(rollouts));
         }
-        Ok(self
-            .likelihoods
+        spec.likelihoods
             .is_some()
             .then(|| WorldKnowledge::Likelihoods {
-                reorders: self.executor.needs().orders,
-                likelihoods,
-            }))
+                reorders: spec.executor.needs().orders,
+                likelihoods: Arc::clone(&self.likelihoods),
+            })
     }
 
-    /// Returns the settings of rollouts of this run in samples of its world.
-    fn rollouts(&self, world: &WorldModel, likelihoods: Arc<Likelihoods>) -> Rollouts {
-        let world = Arc::new(world.clone());
-        let mut flow = self.envelopes();
+    /// Returns the settings of rollouts of this run in samples of the believed world; `None` without one.
+    fn rollouts(&self) -> Option<Rollouts> {
+        let spec = &self.spec;
+        let world = self.beliefs.as_ref();
+        let world = Arc::new(world.filter(|_| spec.believed_world().is_some())?.clone());
+        let mut flow = spec.envelopes();
         flow.world = Some(Arc::clone(&world));
-        Rollouts {
+        Some(Rollouts {
             world,
-            executor: self.executor.clone(),
-            settings: self.settings(),
+            executor: spec.executor.clone(),
+            settings: spec.settings(),
             flow,
-            likelihoods,
-            replanning: Some(Replanning::within(&self.embedded())),
+            likelihoods: Arc::clone(&self.likelihoods),
+            replanning: Some(Replanning::within(&spec.embedded())),
             is_ready: false,
-        }
+        })
     }
 
-    /// Returns the rollouts of executors that evaluate moves, which replace a table of moves.
-    /// `None` if there is no believed world.
-    fn rollout_policy(
-        &self,
-        task: &Task,
-        model: Option<&WorldModel>,
-    ) -> Result<Option<SharedRolloutPolicy>, SpecError> {
-        if self.believed_world().is_none() || !self.executor.needs().rollouts {
-            return Ok(None);
+    /// Returns the preparer of plans.
+    pub fn preparer(&self) -> PlanPreparer {
+        PlanPreparer::new(self.envelopes())
+    }
+
+    fn envelopes(&self) -> pipeline::Settings {
+        let mut envelopes = self.spec.envelopes();
+        if self.spec.believed_world().is_some() {
+            envelopes.world = self.beliefs.clone().map(Arc::new);
         }
-        let Some(world) = model else {
-            return Ok(None);
+        envelopes
+    }
+
+    /// Returns the execution of the specification. The caller adds the planner, the initial plan
+    /// and the world. Tables and likelihoods for the executor are computed within limits that do
+    /// not depend on the machine.
+    ///
+    /// # Errors
+    /// When its files cannot be read, or its members are inconsistent.
+    pub fn execution(&self) -> Result<Execution<'static>, SpecError> {
+        let (spec, task) = (&self.spec, &self.task);
+        spec.check()?;
+        if let Some(feature) = task.validator_only_feature() {
+            return Err(SpecError::UnsupportedFeature(feature));
+        }
+        if let Some(mistake) = unknown_action(&spec.timeout, task.problem()) {
+            return Err(SpecError::Timeout(mistake));
+        }
+        let model = self.beliefs.as_ref();
+        let model = model.filter(|_| spec.executor.uses_world_model());
+        let is_embedded = matches!(spec.planner_choice()?, PlannerChoice::Embedded);
+        // A table of moves has a fixed goal.
+        let has_table = spec.executor.needs().action_values && !spec.is_persistent;
+        let table = model.filter(|_| has_table);
+        let table = table.map(|model| self.action_values(model, is_embedded));
+        let (table, no_table) = match table.transpose() {
+            Ok(table) => (table, None),
+            Err(why) => (None, Some(why)),
         };
-        let rollouts = self.rollouts(world, self.likelihoods(task)?);
-        let rehearse = RolloutPolicy::new(rollouts, self.embedded());
-        Ok(Some(SharedRolloutPolicy::new(rehearse)))
+        let model = model.filter(|_| is_embedded);
+        let needs_rollouts = model.is_some() && spec.executor.needs().rollouts && table.is_none();
+        let rollouts = needs_rollouts.then(|| self.rollouts()).flatten();
+        let rollouts = rollouts.map(|rollouts| {
+            SharedRolloutPolicy::new(RolloutPolicy::new(rollouts, spec.embedded()))
+        });
+        let odds = model.filter(|_| spec.executor.needs_odds()).map(|model| {
+            let time = spec.expected_planning_time();
+            Box::new(MostProbablePlanner::new(
+                model.clone(),
+                spec.embedded(),
+                time,
+            )) as Box<dyn PlanComparator>
+        });
+        Ok(Execution::of(task)
+            .by(spec.executor.clone())
+            .with_settings(spec.settings())
+            .persistent(spec.is_persistent)
+            .interactive(spec.is_interactive)
+            .with_envelopes(self.envelopes())
+            .with_likelihoods(Arc::clone(&self.likelihoods))
+            .with_plan_comparator(odds)
+            .with_action_values(table)
+            .with_missing_table_reason(no_table)
+            .with_rollouts(rollouts))
     }
 
+    /// Computes the table of moves for the world of `model`.
+    ///
+    /// # Errors
+    /// The reason for a missing table, for users.
+    fn action_values(
+        &self,
+        model: &WorldModel,
+        is_embedded: bool,
+    ) -> Result<Arc<dyn ActionValues>, String> {
+        let embedded = self.spec.embedded();
+        let budget = work::Budget::new(embedded.work);
+        let goes_on = || !budget.is_spent();
+        let planner = is_embedded.then_some(embedded);
+        action_values(&self.task, model, planner, Settings::default(), &goes_on)
+    }
+}
+
+impl RunSpec {
     /// Returns the default criterion for a first plan: its probability, if the embedded planner
     /// makes it and there is a model of the world or of likelihoods; otherwise, its makespan or
     /// metric.
@@ -295,6 +330,50 @@ impl RunSpec {
         } else {
             FirstPlan::Shortest
         }
+    }
+
+    /// Returns the planner that [`Self::planner`] names, with the limits of the run, and with
+    /// `clock` and `goes_on` as in [`Embedded`]. For executors that compare plans, it returns the likeliest plan in the
+    /// world of `model`. It does not choose among plans for the first one.
+    ///
+    /// # Errors
+    /// When the planner is unknown, or has no such limit.
+    pub fn planner_of_new_plans<'a>(
+        &self,
+        model: Option<&WorldModel>,
+        clock: &'a (dyn Fn() -> Rational + Sync),
+        goes_on: &'a (dyn Fn() -> bool + Sync),
+    ) -> Result<Box<dyn Planner + 'a>, SpecError> {
+        let embedded = Embedded {
+            clock: Some(clock),
+            may_continue: Some(goes_on),
+            ..self.embedded()
+        };
+        Ok(match self.planner_choice()? {
+            PlannerChoice::Disabled => Box::new(NoPlanner),
+            PlannerChoice::Embedded => match model.filter(|_| self.executor.needs_odds()) {
+                None => Box::new(embedded),
+                Some(model) => {
+                    let time = self.expected_planning_time();
+                    Box::new(MostProbablePlanner::new(model.clone(), embedded, time))
+                }
+            },
+            PlannerChoice::External(planner) => {
+                let given = self.planner_time.as_ref();
+                let limit = given.map(|time| Duration::from_secs_f64(time.to_f64().min(1e9)));
+                Box::new(External {
+                    planner: *planner,
+                    domain: self.domain.source(),
+                    problem: self.problem.source(),
+                    settings: external::Settings {
+                        time_limit: Some(limit.unwrap_or(FIRST_PLAN_TIME_LIMIT)),
+                        ..external::Settings::default()
+                    },
+                    stops_at_first_plan: limit.is_none(),
+                    may_continue: goes_on,
+                })
+            }
+        })
     }
 
     /// Returns the planner that [`Self::planner`] names.
@@ -401,89 +480,6 @@ impl RunSpec {
             PlanningTime::Seconds(seconds) => seconds.clone(),
             PlanningTime::Measured => Rational::ZERO,
         }
-    }
-
-    /// Returns the preparer of plans of this problem.
-    ///
-    /// # Errors
-    /// When the world file cannot be read.
-    pub fn analyst(&self, problem: &Problem) -> Result<PlanPreparer, SpecError> {
-        let model = self.beliefs(problem).map_err(SpecError::World)?;
-        Ok(PlanPreparer::new(self.envelopes_in(model.as_ref())))
-    }
-
-    fn envelopes_in(&self, model: Option<&WorldModel>) -> pipeline::Settings {
-        let mut envelopes = self.envelopes();
-        if self.believed_world().is_some() {
-            envelopes.world = model.cloned().map(Arc::new);
-        }
-        envelopes
-    }
-
-    /// Returns the execution of the specification. The caller adds the planner, the initial plan
-    /// and the world. Tables and likelihoods for the executor are computed within limits that do
-    /// not depend on the machine.
-    ///
-    /// # Errors
-    /// When its files cannot be read, or its members are inconsistent.
-    pub fn execution(&self, task: &Arc<Task>) -> Result<Execution<'static>, SpecError> {
-        self.check()?;
-        if let Some(feature) = task.validator_only_feature() {
-            return Err(SpecError::UnsupportedFeature(feature));
-        }
-        if let Some(mistake) = unknown_action(&self.timeout, task.problem()) {
-            return Err(SpecError::Timeout(mistake));
-        }
-        let model = self.beliefs(task.problem()).map_err(SpecError::World)?;
-        let envelopes = self.envelopes_in(model.as_ref());
-        let model = model.filter(|_| self.executor.uses_world_model());
-        let is_embedded = matches!(self.planner_choice()?, PlannerChoice::Embedded);
-        // A table of moves has a fixed goal.
-        let has_table = self.executor.needs().action_values && !self.is_persistent;
-        let tabulated = model.as_ref().filter(|_| has_table);
-        let tabulated = tabulated.map(|model| self.action_values(task, model, is_embedded));
-        let (outlook, no_table) = match tabulated.transpose() {
-            Ok(outlook) => (outlook, None),
-            Err(why) => (None, Some(why)),
-        };
-        let model = model.filter(|_| is_embedded);
-        let rehearsal = match &outlook {
-            Some(_) => None,
-            None => self.rollout_policy(task, model.as_ref())?,
-        };
-        let odds = model.filter(|_| self.executor.needs_odds()).map(|model| {
-            let time = self.expected_planning_time();
-            Box::new(MostProbablePlanner::new(model, self.embedded(), time))
-                as Box<dyn PlanComparator>
-        });
-        Ok(Execution::of(task)
-            .by(self.executor.clone())
-            .with_settings(self.settings())
-            .persistent(self.is_persistent)
-            .interactive(self.is_interactive)
-            .with_envelopes(envelopes)
-            .with_likelihoods(self.likelihoods(task)?)
-            .with_plan_comparator(odds)
-            .with_action_values(outlook)
-            .with_missing_table_reason(no_table)
-            .with_rollouts(rehearsal))
-    }
-
-    /// Computes the table of moves for the world of `model`.
-    ///
-    /// # Errors
-    /// The reason for a missing table, for users.
-    fn action_values(
-        &self,
-        task: &Arc<Task>,
-        model: &WorldModel,
-        is_embedded: bool,
-    ) -> Result<Arc<dyn ActionValues>, String> {
-        let embedded = self.embedded();
-        let budget = work::Budget::new(embedded.work);
-        let goes_on = || !budget.is_spent();
-        let planner = is_embedded.then_some(embedded);
-        action_values(task, model, planner, Settings::default(), &goes_on)
     }
 }
 

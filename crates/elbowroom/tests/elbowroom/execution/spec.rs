@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use elbowroom::answers::run::simulate;
-use elbowroom::answers::{NoObserver, RunAnswer, RunRequest};
-use elbowroom::execute::{AdversarySettings, NamedText, RunSpec, SpecError};
+use elbowroom::answers::{NoObserver, RunAnswer};
+use elbowroom::execute::{AdversarySettings, NamedText, RunInputs, RunSpec, SpecError, WorldNames};
 use elbowroom::execution::run::Verdict;
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
@@ -188,7 +188,8 @@ fn inconsistent_settings_are_rejected_before_the_run() {
     let check = |change: &dyn Fn(&mut RunSpec)| {
         let mut spec = spec();
         change(&mut spec);
-        spec.execution(&task).err()
+        let inputs = RunInputs::of(spec, Arc::clone(&task), &WorldNames::default());
+        inputs.and_then(|inputs| inputs.execution()).err()
     };
     let live = || "live:5".parse().expect("a correct test");
     assert!(check(&|_| {}).is_none());
@@ -236,8 +237,12 @@ fn answer_and_trace_lines_round_trip() {
         let mut sink = |line: &str| text.push_str(line);
         let mut writer = TraceWriter::new(Arc::clone(&task), &mut sink);
         writer.header(&spec).expect("texts and numbers");
-        let request = RunRequest::new(&spec, &task).recorded_by(&mut writer);
-        let answer = simulate(request, &mut NoObserver).expect("a world").answer;
+        let inputs = RunInputs::of(spec.clone(), Arc::clone(&task), &WorldNames::default());
+        let inputs = inputs.expect("texts");
+        let execution = inputs.execution().expect("a consistent specification");
+        let execution = execution.recorded_by(&mut writer);
+        let outcome = simulate(&inputs, execution, &mut NoObserver);
+        let answer = outcome.expect("a world").answer;
 
         let written = serde_json::to_string(&answer).expect("texts and numbers");
         let read: RunAnswer = serde_json::from_str(&written).expect("what was written");
@@ -266,11 +271,9 @@ fn answer_of_policy(world: &str, budget: &str) -> RunAnswer {
         planning_budget: Some(budget.parse().expect("a correct test")),
         ..spec()
     };
-    let problem = read_problem(&spec.domain.source(), &spec.problem.source());
-    let (problem, _) = problem.expect("a correct test");
-    let task = Arc::new(Task::new(problem));
-    let request = RunRequest::new(&spec, &task);
-    let outcome = simulate(request, &mut NoObserver).expect("a correct test");
+    let (inputs, _) = RunInputs::read(spec).expect("a correct test");
+    let execution = inputs.execution().expect("a correct test");
+    let outcome = simulate(&inputs, execution, &mut NoObserver).expect("a correct test");
     outcome.answer
 }
 
@@ -328,11 +331,10 @@ fn policy_does_not_start_a_refused_action_without_end() {
             time_limit: Rational::from(100),
             ..RunSpec::new(domain.clone(), problem.clone())
         };
-        let (problem, _) =
-            read_problem(&spec.domain.source(), &spec.problem.source()).expect("a correct test");
-        let task = Arc::new(Task::new(problem));
-        let request = RunRequest::new(&spec, &task);
-        let report = simulate(request, &mut NoObserver).expect("a world").report;
+        let (inputs, _) = RunInputs::read(spec).expect("a correct test");
+        let execution = inputs.execution().expect("a correct test");
+        let outcome = simulate(&inputs, execution, &mut NoObserver);
+        let report = outcome.expect("a world").report;
         limits += usize::from(report.verdict == Verdict::ReplanLimit);
         assert_ne!(report.verdict, Verdict::TimeLimit, "{seed}");
         assert!(report.starts < 300, "{seed}: {}", report.starts);
