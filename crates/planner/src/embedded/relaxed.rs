@@ -47,6 +47,10 @@ pub(crate) use resources::reservoirs;
 /// Upper limit of costs.
 const MOST: u32 = 1 << 15;
 
+/// The additional cost of an operator that can start only at the end of the present plan, where
+/// work is spread.
+const MOST_LATENESS: Ticks = 7;
+
 /// Cost of an unreached proposition.
 const UNREACHED: u32 = u32::MAX;
 
@@ -66,6 +70,19 @@ pub(crate) struct Estimate {
     pub(crate) subgoals: Vec<Literal>,
     /// The actions that start in the relaxed plan, if they were requested.
     pub(crate) actions: Vec<u32>,
+}
+
+/// A part of the goal, as propositions of the relaxed problem.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct Subgoal {
+    /// The goals that must hold.
+    pub(crate) kept: Box<[u32]>,
+    /// The goals one of which must hold.
+    pub(crate) candidates: Box<[u32]>,
+    /// The operators that are too late.
+    pub(crate) late_operators: Box<[u32]>,
+    /// The cost of each operator; empty if these are the usual ones.
+    pub(crate) costs: Box<[u8]>,
 }
 
 /// An unreachable part of the goal.
@@ -90,12 +107,16 @@ pub(crate) struct Relaxed<'a> {
     operator_cost: Vec<u32>,
     /// Cost of each operator.
     own_cost: Vec<u32>,
+    /// Cost of each operator in estimates for a subgoal.
+    subgoal_cost: Vec<u32>,
     /// The effects of each operator.
     reaches: Vec<Reaches>,
     is_used: Vec<bool>,
     is_wanted: Vec<bool>,
     gaps: Vec<f64>,
     buckets: Vec<Vec<u32>>,
+    /// The cost up to which costs were propagated.
+    propagated_cost: usize,
     applicable: Vec<u32>,
     deadlines: Deadlines,
     resources: Resources,
@@ -106,8 +127,10 @@ pub(crate) struct Relaxed<'a> {
     pub(crate) is_chronological: bool,
     /// `true` if estimates list the literals that their relaxed plans achieve.
     pub(crate) lists_subgoals: bool,
+    /// `true` if estimates list the actions of their relaxed plans.
+    pub(crate) lists_actions: bool,
     /// `true` for repairs: an estimate stops when the whole goal is reached, so that not all
-    /// applicable steps are listed, and lists the actions of its relaxed plan.
+    /// applicable steps are listed.
     pub(crate) serves_repairs: bool,
 }
 
@@ -142,16 +165,19 @@ impl<'a> Relaxed<'a> {
             missing: Vec::with_capacity(operators),
             operator_cost: vec![0; operators],
             own_cost: own_costs(&graph),
+            subgoal_cost: Vec::new(),
             reaches: graph.operators.iter().map(Reaches::of).collect(),
             is_used: vec![false; operators],
             is_wanted: vec![false; propositions],
             gaps: vec![0.0; compiled.tests.len()],
             buckets: Vec::new(),
+            propagated_cost: 0,
             applicable: Vec::new(),
             deadlines: Deadlines::default(),
             horizon: NEVER,
             is_chronological: false,
             lists_subgoals: false,
+            lists_actions: false,
             serves_repairs: false,
             graph,
         }
@@ -219,7 +245,7 @@ impl<'a> Relaxed<'a> {
         if instances.count() != 1 {
             return false;
         }
-        self.prepare(state);
+        self.prepare(state, None);
         let end = self.compiled.snap(self.compiled.action(action).end);
         let is_true = |cost: &[u32]| end.adds.iter().any(|&f| cost[2 * f as usize] != UNREACHED);
         if is_true(&self.cost) {
@@ -227,7 +253,8 @@ impl<'a> Relaxed<'a> {
             return false;
         }
         self.missing[self.graph.end_of[action as usize] as usize] += 1;
-        self.propagate_costs(state, self.serves_repairs);
+        self.propagate_costs(state, self.serves_repairs, None);
+        self.buckets.iter_mut().for_each(Vec::clear);
         !is_true(&self.cost)
     }
 
@@ -273,16 +300,42 @@ impl<'a> Relaxed<'a> {
 
     /// Returns the estimate, or `None` if even the relaxed goal is unreachable.
     pub(crate) fn evaluate(&mut self, state: &State) -> Option<Estimate> {
-        if !self.prepare(state) {
-            self.buckets.iter_mut().for_each(Vec::clear);
+        let estimate = self.evaluate_goals(state, None);
+        self.buckets.iter_mut().for_each(Vec::clear);
+        estimate
+    }
+
+    /// As [`evaluate`](Self::evaluate), for a part of the goal. Only the operators that the subgoal
+    /// names are too late.
+    pub(crate) fn evaluate_subgoal(
+        &mut self,
+        state: &State,
+        subgoal: &Subgoal,
+    ) -> Option<Estimate> {
+        if !subgoal.costs.is_empty() {
+            self.subgoal_cost.clear();
+            let costs = subgoal.costs.iter().copied();
+            self.subgoal_cost.extend(costs.map(u32::from));
+            std::mem::swap(&mut self.own_cost, &mut self.subgoal_cost);
+        }
+        let estimate = self.evaluate_goals(state, Some(subgoal));
+        if !subgoal.costs.is_empty() {
+            std::mem::swap(&mut self.own_cost, &mut self.subgoal_cost);
+        }
+        self.buckets.iter_mut().for_each(Vec::clear);
+        estimate
+    }
+
+    fn evaluate_goals(&mut self, state: &State, subgoal: Option<&Subgoal>) -> Option<Estimate> {
+        if !self.prepare(state, subgoal) {
             return None;
         }
-        // Without separate ends, costs above those of the goal do not change the relaxed plan. Resources and
-        // consumables need the costs of other operators.
-        let asks_for_others = self.graph.has_single_starts
-            || !self.resources.is_empty()
-            || !self.consumables.is_empty();
-        self.propagate_costs(state, self.serves_repairs || !asks_for_others);
+        // Without separate ends, costs above those of the goal do not change the relaxed plan.
+        // Consumables need the costs of other operators.
+        let asks_for_others =
+            self.graph.has_single_starts && subgoal.is_none() || !self.consumables.is_empty();
+        let stops_early = self.serves_repairs || !asks_for_others;
+        self.propagate_costs(state, stops_early, subgoal);
         let mut estimate = Estimate::default();
         for open in &state.open {
             let end = self.graph.end_of[open.action as usize];
@@ -290,26 +343,60 @@ impl<'a> Relaxed<'a> {
                 return None;
             }
         }
-        if self
-            .graph
-            .goal
-            .iter()
-            .any(|&goal| self.cost[goal as usize] == UNREACHED)
-        {
-            return None;
-        }
-        self.extract(state, &mut estimate);
-        if state.timed < self.compiled.timed_until_goal {
+        let wanted = self.wanted_goals(subgoal)?;
+        self.extract(state, wanted, &mut estimate);
+        if state.timed < self.compiled.timed_until_goal && subgoal.is_none() {
             self.await_timed(state, &mut estimate);
         }
         self.list_applicable(state, &mut estimate);
         Some(estimate)
     }
 
+    /// Returns the propositions that a relaxed plan must reach: the goal, or the part of it with its
+    /// cheapest candidate. Returns `None` if one is unreachable.
+    fn wanted_goals(&self, subgoal: Option<&Subgoal>) -> Option<Vec<u32>> {
+        let cost = |goal: &&u32| self.cost[**goal as usize];
+        let mut wanted = subgoal
+            .map_or(&self.graph.goal[..], |subgoal| &subgoal.kept)
+            .to_vec();
+        if let Some(subgoal) = subgoal {
+            wanted.extend(subgoal.candidates.iter().min_by_key(cost));
+        }
+        wanted
+            .iter()
+            .all(|goal| cost(&goal) < UNREACHED)
+            .then_some(wanted)
+    }
+
+    /// Returns the operators that are too late from a state. If `has_costs`, also returns a cost for
+    /// each operator: one, and more if it can start only towards the end of the present plan, since
+    /// an object that it needs is busy or a window is closed.
+    pub(crate) fn lateness(&mut self, state: &State, has_costs: bool) -> (Box<[u32]>, Box<[u8]>) {
+        if self.graph.windows.is_empty() && !has_costs {
+            return Default::default();
+        }
+        let missing = &mut self.graph.precondition_counts.clone();
+        let (compiled, graph, horizon) = (self.compiled, &self.graph, self.horizon);
+        let deadlines = &mut self.deadlines;
+        deadlines.exclude_late_operators(compiled, graph, state, horizon, None, missing);
+        let late = deadlines.late_operators();
+        let elapsed = state.earliest_end() - compiled.now;
+        if elapsed <= 0 || !has_costs {
+            return (late, Box::default());
+        }
+        let starts = graph.operators.iter().zip(&deadlines.earliest_starts);
+        let costs = starts.map(|(operator, &start)| {
+            let wait = (start - compiled.now).clamp(0, elapsed);
+            let cost = i64::from(operator.cost) * (1 + wait * MOST_LATENESS / elapsed);
+            u8::try_from(cost).unwrap_or(u8::MAX)
+        });
+        (late, costs.collect())
+    }
+
     /// Returns the applicable steps without an estimate, or `None` if the running actions cannot
     /// end in time, according to incomplete checks.
     pub(crate) fn list(&mut self, state: &State) -> Option<Estimate> {
-        let is_in_time = self.prepare(state);
+        let is_in_time = self.prepare(state, None);
         if is_in_time {
             self.propagate_zero_costs(state);
         }
@@ -321,7 +408,7 @@ impl<'a> Relaxed<'a> {
 
     /// Initializes the costs of the propositions that hold in the state. Returns `false` if some
     /// running action cannot end in time, according to incomplete checks.
-    fn prepare(&mut self, state: &State) -> bool {
+    fn prepare(&mut self, state: &State, subgoal: Option<&Subgoal>) -> bool {
         let mut is_in_time = true;
         let spans = self
             .is_chronological
@@ -338,7 +425,13 @@ impl<'a> Relaxed<'a> {
         let outlasts = |open: &OpenAction| {
             open.most < NEVER && (open.node == SETTLED || self.is_chronological)
         };
-        if self.horizon < NEVER || !self.graph.windows.is_empty() || state.open.iter().any(outlasts)
+        if let Some(subgoal) = subgoal {
+            for &operator in &subgoal.late_operators {
+                self.missing[operator as usize] += 1;
+            }
+        } else if self.horizon < NEVER
+            || !self.graph.windows.is_empty()
+            || state.open.iter().any(outlasts)
         {
             is_in_time = self.deadlines.exclude_late_operators(
                 self.compiled,

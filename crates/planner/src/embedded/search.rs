@@ -17,6 +17,7 @@ mod node;
 mod novelty;
 mod open_list;
 mod runaway;
+mod serialization;
 mod states;
 mod strategy;
 mod successor_list;
@@ -391,8 +392,14 @@ impl<'a> Search<'a> {
             return Expansion::Nothing;
         }
         self.evaluated += 1;
-        let (accepted, left) = self.remaining_landmarks(parent, &state);
-        let estimate = if self.needs_estimate(parent, left) {
+        let (accepted, mut left) = self.remaining_landmarks(parent, &state);
+        let mut agenda = NONE;
+        let estimate = if self.strategy.serializes_goals {
+            self.estimate_subgoal(parent, &state).map(|found| {
+                (agenda, left) = (found.1, found.2);
+                found.0
+            })
+        } else if self.needs_estimate(parent, left) {
             self.relaxed.evaluate(&state)
         } else {
             self.relaxed.list(&state)
@@ -425,6 +432,7 @@ impl<'a> Search<'a> {
             state,
             notes,
         );
+        self.nodes[number as usize].agenda = agenda;
         self.closed_list.push(hash);
         // A goal state may still have useful successors: the validator can reject the plan, and
         // another plan can be better.
@@ -462,6 +470,7 @@ impl<'a> Search<'a> {
             remaining: left,
             accepted,
             progress: NONE,
+            agenda: NONE,
             dead_end: DeadEnd::Unchecked,
             notes,
         });

@@ -32,6 +32,8 @@ pub enum Technique {
     Width,
     /// Searches that count landmarks.
     Landmarks,
+    /// A search that achieves the conjuncts of the goal one after the other.
+    Serialization,
     /// Searches in chronological order.
     Chronological,
     /// In the relaxed problem, a fact that holds only while an envelope runs does not support
@@ -80,6 +82,7 @@ impl Technique {
         (Self::Novelty, "novelty"),
         (Self::Width, "width"),
         (Self::Landmarks, "landmarks"),
+        (Self::Serialization, "serialization"),
         (Self::Chronological, "chronological"),
         (Self::Envelopes, "envelopes"),
         (Self::Macros, "macros"),
@@ -119,6 +122,11 @@ pub enum Member {
     /// Novelty of successors decides, among those with the same number of remaining landmarks
     /// (BFWS(f₅)).
     LandmarkWidth,
+    /// The conjuncts of the goal are achieved one after the other.
+    Serializing,
+    /// As [`Serializing`](Self::Serializing), with higher costs of steps that must wait for an
+    /// object or a window.
+    Spreading,
     /// A complete search.
     Complete,
 }
@@ -135,6 +143,8 @@ impl Member {
         (Self::Width, "width"),
         (Self::Landmarks, "landmarks"),
         (Self::LandmarkWidth, "landmark-width"),
+        (Self::Serializing, "serializing"),
+        (Self::Spreading, "spreading"),
         (Self::Complete, "complete"),
     ];
 }

@@ -20,9 +20,9 @@ use crate::embedded::testing::{self, compiled};
 /// Returns the estimate without an early stop.
 fn whole(relaxed: &mut Relaxed<'_>, state: &State) -> Option<Estimate> {
     relaxed.serves_repairs = false;
-    let is_in_time = relaxed.prepare(state);
+    let is_in_time = relaxed.prepare(state, None);
     if is_in_time {
-        relaxed.propagate_costs(state, false);
+        relaxed.propagate_costs(state, false, None);
     }
     relaxed.buckets.iter_mut().for_each(Vec::clear);
     relaxed.serves_repairs = true;
@@ -38,7 +38,8 @@ fn whole(relaxed: &mut Relaxed<'_>, state: &State) -> Option<Estimate> {
         return None;
     }
     let mut estimate = Estimate::default();
-    relaxed.extract(state, &mut estimate);
+    let wanted = relaxed.graph.goal.clone();
+    relaxed.extract(state, wanted, &mut estimate);
     if state.timed < relaxed.compiled.timed_until_goal {
         relaxed.await_timed(state, &mut estimate);
     }
@@ -49,7 +50,7 @@ fn whole(relaxed: &mut Relaxed<'_>, state: &State) -> Option<Estimate> {
 /// Returns the cost of each proposition: the minimum, over its achievers, of the sum over their
 /// preconditions.
 fn plain_costs(relaxed: &mut Relaxed<'_>, state: &State) -> Option<Vec<u32>> {
-    if !relaxed.prepare(state) {
+    if !relaxed.prepare(state, None) {
         relaxed.buckets.iter_mut().for_each(Vec::clear);
         return None;
     }
@@ -124,6 +125,7 @@ fn compare(
     let relaxed = || {
         let mut relaxed = Relaxed::new(compiled, compresses);
         relaxed.serves_repairs = true;
+        relaxed.lists_actions = true;
         relaxed.set_costs(
             (0..)
                 .zip(prices.iter().copied())

@@ -41,6 +41,10 @@ impl Planner<'_> {
             let plain = novelty.with_share(tuning.novelty_share);
             strategies.splice(1..1, [novelty.replenishing(), plain]);
         }
+        if tuning.uses(Technique::Serialization) {
+            let members = [Member::Spreading, Member::Serializing];
+            strategies.splice(1..1, members.map(|member| Strategy::of(member, tuning)));
+        }
         let counts_landmarks =
             tuning.uses(Technique::Landmarks) && !self.frame.compiled.is_symbolic;
         let needs_concurrency = self.needs_concurrency();

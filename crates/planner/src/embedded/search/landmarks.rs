@@ -4,7 +4,7 @@ use super::super::landmarks::Landmarks;
 use super::super::mutex::Mutexes;
 use super::super::relaxed::Labels;
 use super::super::state::State;
-use super::novelty::goals_left;
+use super::goals::conjuncts;
 use super::{Expansion, Search};
 
 /// Work of a turn that searches for landmarks, per unit of the maximum work of an estimate.
@@ -81,7 +81,10 @@ impl Search<'_> {
             return landmarks.progress(self.compiled, before, state);
         }
         match self.strategy.novelty {
-            Some(_) => (Vec::new(), goals_left(self.compiled, state)),
+            Some(_) => {
+                let left = conjuncts(self.compiled, state).filter(|holds| !holds);
+                (Vec::new(), u32::try_from(left.count()).unwrap_or(u32::MAX))
+            }
             None => (Vec::new(), 0),
         }
     }

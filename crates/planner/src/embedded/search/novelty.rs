@@ -11,7 +11,7 @@
 //! decreases.
 
 use super::super::compile::Compiled;
-use super::super::formula::{Formula, Literal};
+use super::super::formula::Literal;
 use super::super::hash::Map;
 use super::super::state::State;
 
@@ -85,6 +85,11 @@ impl Novelty {
             relaxed_plan: u32::try_from(self.relaxed_plans.len() - 1).unwrap_or(u32::MAX),
             reached: vec![0; subgoals.len().div_ceil(64)].into(),
         }
+    }
+
+    /// Forgets the facts seen.
+    pub(super) fn forget(&mut self) {
+        self.seen.values_mut().for_each(|seen| seen.fill(0));
     }
 
     fn relaxed_plan(&self, progress: &Progress) -> &[Literal] {
@@ -185,24 +190,6 @@ fn remember(seen: &mut [u64], facts: &[u64]) -> bool {
         *seen |= facts;
     }
     is_new
-}
-
-/// Returns the number of conjuncts of the goal that do not hold.
-pub(super) fn goals_left(compiled: &Compiled, state: &State) -> u32 {
-    let goal: &Formula = &compiled.goal;
-    let literals = goal.literals.iter().filter(|l| !l.holds(&state.facts));
-    let tests = goal
-        .tests
-        .iter()
-        .filter(|&&test| !state.test_holds(compiled, test, None));
-    let choices = goal.choices.iter().filter(|choice| {
-        let mut passes = |test: u32| state.test_holds(compiled, test, None);
-        !choice
-            .iter()
-            .any(|part| part.holds(&state.facts, &mut passes))
-    });
-    let left = literals.count() + tests.count() + choices.count();
-    u32::try_from(left).unwrap_or(u32::MAX)
 }
 
 #[cfg(test)]

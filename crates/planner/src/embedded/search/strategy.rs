@@ -28,6 +28,10 @@ pub(crate) struct Strategy {
     /// `true` if the number of remaining landmarks has priority over the estimate, or counts as the
     /// number of remaining goals.
     pub(crate) counts_landmarks: bool,
+    /// `true` if the conjuncts of the goal are achieved one after the other.
+    pub(crate) serializes_goals: bool,
+    /// `true` if subgoals prefer objects that are free early.
+    pub(crate) spreads_work: bool,
     /// `true` if relaxed plans account for consumables, which are never replenished.
     pub(crate) draws_on_consumables: bool,
     /// `true` if consumables are saved.
@@ -84,6 +88,8 @@ impl Strategy {
         saves_consumables: false,
         novelty: None,
         counts_landmarks: false,
+        serializes_goals: false,
+        spreads_work: false,
         replenishes: false,
         joins: false,
         counts_steps: false,
@@ -133,6 +139,17 @@ impl Strategy {
                 uses_macros,
                 ..Self::of(Member::Compressing, tuning)
             },
+            Member::Serializing => Self {
+                serializes_goals: true,
+                novelty: Some(NoveltyOf::Expanded),
+                replenishes: true,
+                uses_macros,
+                ..Self::of(Member::Compressing, tuning)
+            },
+            Member::Spreading => Self {
+                spreads_work: true,
+                ..Self::of(Member::Serializing, tuning)
+            },
             Member::LandmarkWidth => Self {
                 counts_landmarks: true,
                 ..Self::of(Member::Width, tuning)
@@ -161,6 +178,7 @@ impl Strategy {
         if self.replenishes {
             relaxed.count_resources();
         }
+        relaxed.lists_actions = self.serializes_goals;
         relaxed.lists_subgoals = self.novelty == Some(NoveltyOf::Successors);
         relaxed
     }
@@ -180,6 +198,12 @@ impl Strategy {
     /// itself.
     pub(crate) fn alternates(&self) -> bool {
         self.compresses.is_some() && self.novelty.is_none() && self.aim == Aim::Goal
+    }
+
+    /// Returns `true` if the number of remaining landmarks or conjuncts has priority over the
+    /// estimate.
+    pub(super) fn ranks_remaining(&self) -> bool {
+        self.counts_landmarks || self.serializes_goals
     }
 
     /// Returns `true` if it loses no plans, except as

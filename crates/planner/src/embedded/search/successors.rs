@@ -17,7 +17,7 @@ impl Search<'_> {
             self.expand_by_width(number, estimate);
             return;
         }
-        let left = if self.strategy.counts_landmarks {
+        let left = if self.strategy.ranks_remaining() {
             self.nodes[number as usize].remaining
         } else {
             0
@@ -177,6 +177,9 @@ impl Search<'_> {
 
     /// Returns the rank of a state in the queue of its search; lower ranks come first.
     fn rank(&mut self, number: u32, estimate: u32) -> i64 {
+        if self.strategy.serializes_goals {
+            return self.rank_of_subgoal(number, estimate);
+        }
         if let Some(novelty) = &mut self.novelty {
             let left = self.nodes[number as usize].remaining;
             let state = self.states.get(number);
@@ -184,7 +187,7 @@ impl Search<'_> {
             self.memory += memory;
             return new << 48 | i64::from(left) << 24 | i64::from(estimate.min(1 << 23));
         }
-        if self.strategy.counts_landmarks {
+        if self.strategy.ranks_remaining() {
             let left = self.nodes[number as usize].remaining;
             let (overdrawn, estimate) = (estimate / OVERDRAWN, estimate % OVERDRAWN);
             return i64::from(overdrawn) << 48 | i64::from(left) << 24 | i64::from(estimate);
@@ -199,6 +202,23 @@ impl Search<'_> {
             return estimate;
         };
         step_costs.spent(self.compiled, &self.states.get(number)) + factor * estimate
+    }
+
+    /// Returns the rank of a state in a search that serializes the goal: states with fewer remaining
+    /// conjuncts first, then novel ones. So the search leaves plateaus, and sequences of steps that
+    /// only change numbers.
+    fn rank_of_subgoal(&mut self, number: u32, estimate: u32) -> i64 {
+        let left = self.nodes[number as usize].remaining;
+        let (overdrawn, estimate) = (estimate / OVERDRAWN, estimate % OVERDRAWN);
+        let mut is_old = false;
+        if let Some(novelty) = &mut self.novelty {
+            let state = self.states.get(number);
+            let (new, memory) = novelty.of(self.compiled, &state, (0, estimate));
+            self.memory += memory;
+            is_old = new == 3;
+        }
+        let overdrawn = i64::from(overdrawn) << 56;
+        overdrawn | i64::from(left) << 32 | i64::from(is_old) << 31 | i64::from(estimate)
     }
 
     /// Generates the successor. In a compressing search, the started action is also ended, if
