@@ -16,6 +16,7 @@ mod labels;
 mod numbers;
 mod plan;
 mod resources;
+mod subgoal;
 #[cfg(test)]
 mod tests;
 
@@ -43,13 +44,10 @@ pub(crate) use labels::Labels;
 pub(crate) use plan::OVERDRAWN;
 use resources::Resources;
 pub(crate) use resources::reservoirs;
+pub(crate) use subgoal::Subgoal;
 
 /// Upper limit of costs.
 const MOST: u32 = 1 << 15;
-
-/// The additional cost of an operator that can start only at the end of the present plan, where
-/// work is spread.
-const MOST_LATENESS: Ticks = 7;
 
 /// Cost of an unreached proposition.
 const UNREACHED: u32 = u32::MAX;
@@ -70,19 +68,6 @@ pub(crate) struct Estimate {
     pub(crate) subgoals: Vec<Literal>,
     /// The actions that start in the relaxed plan, if they were requested.
     pub(crate) actions: Vec<u32>,
-}
-
-/// A part of the goal, as propositions of the relaxed problem.
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
-pub(crate) struct Subgoal {
-    /// The goals that must hold.
-    pub(crate) kept: Box<[u32]>,
-    /// The goals one of which must hold.
-    pub(crate) candidates: Box<[u32]>,
-    /// The operators that are too late.
-    pub(crate) late_operators: Box<[u32]>,
-    /// The cost of each operator; empty if these are the usual ones.
-    pub(crate) costs: Box<[u8]>,
 }
 
 /// An unreachable part of the goal.
@@ -305,27 +290,6 @@ impl<'a> Relaxed<'a> {
         estimate
     }
 
-    /// As [`evaluate`](Self::evaluate), for a part of the goal. Only the operators that the subgoal
-    /// names are too late.
-    pub(crate) fn evaluate_subgoal(
-        &mut self,
-        state: &State,
-        subgoal: &Subgoal,
-    ) -> Option<Estimate> {
-        if !subgoal.costs.is_empty() {
-            self.subgoal_cost.clear();
-            let costs = subgoal.costs.iter().copied();
-            self.subgoal_cost.extend(costs.map(u32::from));
-            std::mem::swap(&mut self.own_cost, &mut self.subgoal_cost);
-        }
-        let estimate = self.evaluate_goals(state, Some(subgoal));
-        if !subgoal.costs.is_empty() {
-            std::mem::swap(&mut self.own_cost, &mut self.subgoal_cost);
-        }
-        self.buckets.iter_mut().for_each(Vec::clear);
-        estimate
-    }
-
     fn evaluate_goals(&mut self, state: &State, subgoal: Option<&Subgoal>) -> Option<Estimate> {
         if !self.prepare(state, subgoal) {
             return None;
@@ -350,47 +314,6 @@ impl<'a> Relaxed<'a> {
         }
         self.list_applicable(state, &mut estimate);
         Some(estimate)
-    }
-
-    /// Returns the propositions that a relaxed plan must reach: the goal, or the part of it with its
-    /// cheapest candidate. Returns `None` if one is unreachable.
-    fn wanted_goals(&self, subgoal: Option<&Subgoal>) -> Option<Vec<u32>> {
-        let cost = |goal: &&u32| self.cost[**goal as usize];
-        let mut wanted = subgoal
-            .map_or(&self.graph.goal[..], |subgoal| &subgoal.kept)
-            .to_vec();
-        if let Some(subgoal) = subgoal {
-            wanted.extend(subgoal.candidates.iter().min_by_key(cost));
-        }
-        wanted
-            .iter()
-            .all(|goal| cost(&goal) < UNREACHED)
-            .then_some(wanted)
-    }
-
-    /// Returns the operators that are too late from a state. If `has_costs`, also returns a cost for
-    /// each operator: one, and more if it can start only towards the end of the present plan, since
-    /// an object that it needs is busy or a window is closed.
-    pub(crate) fn lateness(&mut self, state: &State, has_costs: bool) -> (Box<[u32]>, Box<[u8]>) {
-        if self.graph.windows.is_empty() && !has_costs {
-            return Default::default();
-        }
-        let missing = &mut self.graph.precondition_counts.clone();
-        let (compiled, graph, horizon) = (self.compiled, &self.graph, self.horizon);
-        let deadlines = &mut self.deadlines;
-        deadlines.exclude_late_operators(compiled, graph, state, horizon, None, missing);
-        let late = deadlines.late_operators();
-        let elapsed = state.earliest_end() - compiled.now;
-        if elapsed <= 0 || !has_costs {
-            return (late, Box::default());
-        }
-        let starts = graph.operators.iter().zip(&deadlines.earliest_starts);
-        let costs = starts.map(|(operator, &start)| {
-            let wait = (start - compiled.now).clamp(0, elapsed);
-            let cost = i64::from(operator.cost) * (1 + wait * MOST_LATENESS / elapsed);
-            u8::try_from(cost).unwrap_or(u8::MAX)
-        });
-        (late, costs.collect())
     }
 
     /// Returns the applicable steps without an estimate, or `None` if the running actions cannot

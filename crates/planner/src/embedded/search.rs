@@ -392,19 +392,8 @@ impl<'a> Search<'a> {
             return Expansion::Nothing;
         }
         self.evaluated += 1;
-        let (accepted, mut left) = self.remaining_landmarks(parent, &state);
-        let mut agenda = NONE;
-        let estimate = if self.strategy.serializes_goals {
-            self.estimate_subgoal(parent, &state).map(|found| {
-                (agenda, left) = (found.1, found.2);
-                found.0
-            })
-        } else if self.needs_estimate(parent, left) {
-            self.relaxed.evaluate(&state)
-        } else {
-            self.relaxed.list(&state)
-        };
-        let Some(mut estimate) = estimate else {
+        let (accepted, left) = self.remaining_landmarks(parent, &state);
+        let Some((mut estimate, agenda, left)) = self.estimate(parent, &state, left) else {
             // Where actions are compressed, the relaxed plan may lack facts that hold only while an
             // action runs.
             self.is_lossy |= self.strategy.compresses.is_some();

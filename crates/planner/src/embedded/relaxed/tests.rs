@@ -9,7 +9,7 @@ use proptest::prelude::*;
 use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};
 
 use super::graph::{Gain, Kind};
-use super::{Estimate, MOST, Relaxed, UNREACHED};
+use super::{Estimate, MOST, Relaxed, Subgoal, UNREACHED};
 use crate::embedded::apply::Stepper;
 use crate::embedded::compile::{Compiled, Compressibility, NONE};
 use crate::embedded::h2::tests::{Draft, drafts, numeric_drafts};
@@ -115,6 +115,35 @@ fn is_among<T: PartialEq>(few: &[T], many: &[T]) -> bool {
     few.iter().all(|one| many.contains(one))
 }
 
+/// Checks that the estimate of a subgoal has the costs of a full exploration. Returns the cost of
+/// the cheapest candidate.
+fn compare_subgoal(
+    relaxed: &mut Relaxed<'_>,
+    state: &State,
+    kept: &[u32],
+    candidates: &[u32],
+    costs: &[u32],
+) -> u32 {
+    let (late_operators, _) = relaxed.lateness(state, false);
+    let subgoal = Subgoal {
+        kept: kept.into(),
+        candidates: candidates.into(),
+        late_operators,
+        costs: Box::default(),
+    };
+    relaxed.serves_repairs = false;
+    let estimate = relaxed.evaluate_subgoal(state, &subgoal);
+    assert!(estimate.is_some(), "{subgoal:?}");
+    for &goal in kept {
+        assert_eq!(relaxed.cost[goal as usize], costs[goal as usize]);
+    }
+    let own = candidates.iter().map(|&goal| relaxed.cost[goal as usize]);
+    let own = own.min().expect("a candidate");
+    let known = candidates.iter().map(|&goal| costs[goal as usize]);
+    assert_eq!(Some(own), known.min(), "{subgoal:?}");
+    own
+}
+
 /// Compares the estimates of a state.
 fn compare(
     compiled: &Compiled,
@@ -145,6 +174,16 @@ fn compare(
     for &goal in &early.graph.goal {
         assert_eq!(early.cost[goal as usize], costs[goal as usize]);
         assert_eq!(late.cost[goal as usize], costs[goal as usize]);
+    }
+    // Running actions may also end too late, which a subgoal does not account for.
+    if state.open.is_empty() {
+        for goal in late.graph.goal.clone() {
+            let only = compare_subgoal(&mut relaxed(), state, &[], &[goal], &costs);
+            let cheapest = late.graph.goal.iter().map(|&goal| costs[goal as usize]);
+            let any = compare_subgoal(&mut relaxed(), state, &[], &late.graph.goal, &costs);
+            assert!(any <= only && Some(any) == cheapest.min(), "{any}, {only}");
+            compare_subgoal(&mut relaxed(), state, &late.graph.goal, &[goal], &costs);
+        }
     }
     assert!(
         is_among(&stopped.actions, &full.actions),

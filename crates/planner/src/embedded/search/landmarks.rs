@@ -1,7 +1,6 @@
 //! The landmarks of a search that counts them, and the landmarks that a state lacks.
 
 use super::super::landmarks::Landmarks;
-use super::super::mutex::Mutexes;
 use super::super::relaxed::Labels;
 use super::super::state::State;
 use super::goals::conjuncts;
@@ -41,14 +40,7 @@ impl Search<'_> {
                     // If all landmarks are goals, they are no better than counting goals.
                     let is_only = self.compiled.tuning.only.is_some();
                     let found = found.filter(|found| found.intermediate_count > 0 || is_only);
-                    found.map(|mut landmarks| {
-                        if self.compiled.tuning.reasonable_orders > 0 {
-                            let most = self.compiled.tuning.most_mutex_work;
-                            let mutexes = Mutexes::of(self.compiled, initial, most);
-                            landmarks.order_reasonably(graph, &labels, &mutexes);
-                        }
-                        SearchLandmarks::Known(landmarks)
-                    })
+                    found.map(SearchLandmarks::Known)
                 } else if work > self.compiled.tuning.most_landmark_work {
                     None
                 } else {

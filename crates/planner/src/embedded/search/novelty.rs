@@ -4,11 +4,10 @@
 //! contained: single facts, or pairs. Novel states come first, regardless of their estimate. So a
 //! search leaves plateaus of the estimate.
 //!
-//! This is best-first width search (Lipovetzky & Geffner, AAAI 2017), in two forms. In BFWS(f₂),
-//! the worth of a state is its number of unachieved goals and its estimate. In BFWS(f₅), it is the
-//! number of unachieved goals, and the number of facts of a relaxed plan that were achieved since
-//! this number last decreased. That needs no estimate, except for a relaxed plan where the number
-//! decreases.
+//! This is best-first width search (Lipovetzky & Geffner, AAAI 2017). In BFWS(f₅), the worth of a
+//! state is its number of unachieved goals, and the number of facts of a relaxed plan that were
+//! achieved since this number last decreased. That needs no estimate, except for a relaxed plan
+//! where the number decreases. Where the goal is serialized, the worth is the estimate.
 
 use super::super::compile::Compiled;
 use super::super::formula::Literal;

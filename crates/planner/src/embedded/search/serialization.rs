@@ -14,6 +14,7 @@ use super::super::relaxed::{Estimate, OVERDRAWN, Subgoal};
 use super::super::state::State;
 use super::Search;
 use super::goals::conjuncts;
+use super::node;
 
 /// The subgoal of a part of a path.
 #[derive(Debug, PartialEq, Eq, Hash)]
@@ -78,7 +79,7 @@ impl Search<'_> {
                 let agenda = self.next_agenda(state, kept.as_deref(), &whole);
                 let left = self.relaxed.graph().goal.len() - agenda.subgoal.kept.len();
                 if agenda.subgoal.candidates.is_empty() {
-                    return Some((whole, super::node::NONE, 0));
+                    return Some((whole, node::NONE, 0));
                 }
                 let size = agenda.size();
                 let left = u32::try_from(left).unwrap_or(u32::MAX);

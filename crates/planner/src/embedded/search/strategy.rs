@@ -22,8 +22,9 @@ pub(crate) struct Strategy {
     /// `true` if later choices happen no earlier. The latest ends of the running actions are then
     /// known. Some plans are lost.
     pub(crate) is_chronological: bool,
-    /// If present, novel states come first, and then states with more goals achieved. The value
-    /// selects whether the novelty of each successor or of each expanded state is computed.
+    /// If present, novel states come first, among those with the same subgoal if the goal is
+    /// serialized. The value selects whether the novelty of each successor or of each expanded
+    /// state is computed.
     pub(crate) novelty: Option<NoveltyOf>,
     /// `true` if the number of remaining landmarks has priority over the estimate, or counts as the
     /// number of remaining goals.
@@ -54,8 +55,7 @@ pub(crate) struct Strategy {
 /// States whose novelty a search computes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum NoveltyOf {
-    /// The expanded states, among those with the same number of goals and the same estimate
-    /// (BFWS(f₂); Lipovetzky & Geffner, AAAI 2017).
+    /// The expanded states, among those with the same subgoal and the same estimate.
     Expanded,
     /// Each successor, among those with the same number of goals and achieved literals of a relaxed
     /// plan (BFWS(f₅)). States are estimated only if they have one more goal.
@@ -122,12 +122,6 @@ impl Strategy {
                 saves_consumables: true,
                 ..Self::COMPLETE
             },
-            Member::Novelty => Self {
-                novelty: Some(NoveltyOf::Expanded),
-                draws_on_consumables: false,
-                uses_macros,
-                ..Self::of(Member::Compressing, tuning)
-            },
             Member::Width => Self {
                 novelty: Some(NoveltyOf::Successors),
                 draws_on_consumables: false,
@@ -142,7 +136,7 @@ impl Strategy {
             Member::Serializing => Self {
                 serializes_goals: true,
                 novelty: Some(NoveltyOf::Expanded),
-                replenishes: true,
+                replenishes: tuning.uses(Technique::Reservoirs),
                 uses_macros,
                 ..Self::of(Member::Compressing, tuning)
             },
