@@ -142,8 +142,8 @@ pub(crate) enum Command {
     Network(NetworkArgs),
     /// Write a plan's network, or its envelope, for other programs to check
     Export(Box<ExportArgs>),
-    /// Verify an answer without search: its box is inside the envelope and the largest there, or no
-    /// plan exists
+    /// Verify an answer without search: that its box is inside the envelope and is the largest one,
+    /// or that no plan exists
     Verify(VerifyArgs),
     /// Validate plans with the output of VAL, for editors and scripts that expect VAL
     Val(ValArgs),
@@ -183,7 +183,8 @@ impl Command {
 
 #[derive(Args, Debug)]
 #[command(after_help = "\
-The same happens when the program is called `Validate` or `validate`, such as by a link of that name.")]
+The program behaves like `elbowroom val` if it is called as `Validate` or `validate`, for example by a link \
+of that name.")]
 pub(crate) struct ValArgs {
     #[command(flatten)]
     pub(crate) problem: ProblemArgs,
@@ -194,7 +195,7 @@ pub(crate) struct ValArgs {
     #[arg(short, long)]
     pub(crate) verbose: bool,
     /// Tolerance of the bounds of durations; times at most a tenth of it apart count as equal.
-    /// Called as `Validate`, the default is VAL's own, 0.01
+    /// If the program is called as `Validate`, the default is that of VAL, 0.01
     #[arg(short, long, value_name = "T", default_value = "0.001", value_parser = positive_or_zero)]
     #[arg(allow_negative_numbers = true, overrides_with = "tolerance")]
     pub(crate) tolerance: Rational,

@@ -18,7 +18,7 @@ use crate::answers::{EnvelopeOutcome, EnvelopeRequest, NoObserver, RequestError}
 /// Equals [`answers::envelope::envelope`](crate::answers::envelope::envelope) without a watcher.
 ///
 /// # Errors
-/// When `settings.vary` names things that the plan does not have, and when the plan is beyond exact
+/// When `settings.vary` names quantities that the plan does not have, and when the plan is beyond exact
 /// analysis. A plan that does not work is an answer, not an error.
 pub fn robust_plan(
     task: &Arc<Task>,

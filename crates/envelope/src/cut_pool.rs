@@ -28,9 +28,9 @@ pub(crate) struct CutPool {
     finite: BTreeSet<BoxEnd>,
     /// The present box, if it is known.
     current_box: Option<DecoupledEnvelope>,
-    /// The slack of rows in the settled box, for rows that have changed since.
+    /// The slack in the settled box of those rows that have changed since the box was settled.
     settled_slack: Vec<(usize, Option<Rational>)>,
-    /// For each row, `true` if it has changed since.
+    /// For each row, `true` if it has changed since the box was settled.
     has_changed: Vec<bool>,
 }
 

@@ -10,13 +10,13 @@ use elbowroom_stn::{Constraint, Network, NodeId as ClassId};
 /// The ends through which a parameter can make the network inconsistent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Role {
-    /// It is on no cycle.
+    /// No value can: the parameter is on no cycle.
     None,
-    /// Small values can: it is only used as an upper bound.
+    /// Small values can: the parameter is only an upper bound.
     Lower,
-    /// Large values can: it is only used as a lower bound.
+    /// Large values can: the parameter is only a lower bound.
     Upper,
-    /// Both can.
+    /// Small and large values can.
     Both,
 }
 

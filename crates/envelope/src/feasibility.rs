@@ -170,8 +170,8 @@ impl Feasibility {
         network.corner_without_schedule()
     }
 
-    /// Returns `true` if an edge lies on a cycle. An edge "at most the parameter" lies on cycles
-    /// that small values violate.
+    /// Returns `true` if an edge lies on a cycle. An edge with the bound "at most the parameter"
+    /// lies on cycles that small values of the parameter make negative.
     fn is_on_cycle(&self, edge: &Edge) -> bool {
         edge.end.is_none_or(|end| {
             matches!(

@@ -137,7 +137,7 @@ pub enum Requirement {
         fluent: FluentId,
     },
     /// Processes and events keep their nominal course.
-    Nature {
+    Autonomous {
         /// The happening after which it would change.
         after: NodeId,
         /// The course, in words: `the event (boil) happens`.
@@ -228,7 +228,7 @@ pub enum Refusal {
     /// The behaviour of processes and events is unknown, or cannot be described by linear
     /// inequalities.
     #[error("{place}: {obstacle}")]
-    Nature {
+    Autonomous {
         /// Location in the plan or problem.
         place: String,
         /// Description of the obstacle.
@@ -280,7 +280,7 @@ impl Requirement {
                     task.fluent_name(*fluent)
                 )
             }
-            Self::Nature { after, course } => {
+            Self::Autonomous { after, course } => {
                 format!("after {}, {course}", plan.describe_node(task, *after))
             }
             Self::Goal { condition } => {

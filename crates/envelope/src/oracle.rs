@@ -156,7 +156,7 @@ impl Oracle {
         self.accepted.as_ref()
     }
 
-    /// Returns the numbers of conditions of the plan, by what enforces them in an accepted box.
+    /// Returns the numbers of conditions of the plan, by the mechanism that enforces them in an accepted box.
     pub fn conditions(&self) -> Conditions {
         let known = self.soundness.as_ref();
         known.map(Soundness::conditions).unwrap_or_default()

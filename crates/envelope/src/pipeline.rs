@@ -44,7 +44,7 @@ pub fn free(task: &Task, time_triggered: &TimeTriggeredPlan) -> Result<Deordered
 /// plan's own that processes and events take the same course in every schedule.
 ///
 /// # Errors
-/// When the validator rejects the plan, and when `specs` names things that the plan does not have.
+/// When the validator rejects the plan, and when `specs` names quantities that the plan does not have.
 pub fn deorder_and_open(
     task: &Task,
     time_triggered: &TimeTriggeredPlan,
@@ -94,7 +94,7 @@ pub fn reschedule(task: &Task, time_triggered: &TimeTriggeredPlan) -> Option<Tim
 /// as long as these quantities keep their nominal values.
 ///
 /// # Errors
-/// When `specs` names things that the plan does not have.
+/// When `specs` names quantities that the plan does not have.
 pub fn open(
     task: &Task,
     freed: Deordered,
@@ -116,7 +116,7 @@ pub fn without_parameters(task: &Task, freed: Deordered) -> ParametrizedPlan {
 /// Opens further quantities of an STN plan.
 ///
 /// # Errors
-/// When `specs` names things that the plan does not have.
+/// When `specs` names quantities that the plan does not have.
 pub fn open_more_quantities(
     task: &Task,
     plan: ParametrizedPlan,

@@ -106,7 +106,7 @@ pub fn broken_in(
     soundness.broken(task, plan, envelope, None)
 }
 
-/// Numbers of conditions of a plan, by what enforces them in all its schedules.
+/// Numbers of conditions of a plan, by the mechanism that enforces them in all its schedules.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Conditions {
     /// Bounds on the difference of two times: the network implies them, so an executor that
@@ -118,7 +118,7 @@ pub struct Conditions {
 }
 
 impl Soundness {
-    /// Returns the numbers of conditions, by what enforces them.
+    /// Returns the numbers of conditions, by the mechanism that enforces them.
     pub(crate) fn conditions(&self) -> Conditions {
         let direct = self.obligations.direct.iter();
         let is_difference =

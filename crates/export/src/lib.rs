@@ -103,7 +103,7 @@ pub enum ExportError {
 /// Returns the plan of a request with its open quantities.
 ///
 /// # Errors
-/// When the validator rejects the plan, or the request names things that the plan does not have.
+/// When the validator rejects the plan, or the request names quantities that the plan does not have.
 pub fn parametrized_plan(request: &EnvelopeRequest) -> Result<ParametrizedPlan, PipelineError> {
     Ok(envelope::parametrized_plan(request)?.0)
 }

@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn braces_that_are_no_placeholders_stay() {
+    fn unknown_braces_are_kept() {
         let line = "p {domain} {problem} {\"a\":1} {1,2} {}";
         assert_eq!(arguments(line)[2..], ["{a:1}", "{1,2}", "{}"]);
     }

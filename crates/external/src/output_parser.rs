@@ -237,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn a_broken_line_counts_only_among_actions() {
+    fn malformed_line_is_reported_only_between_actions() {
         let (plans, _) = plans(b"0: (a\n1: (b)\nnoise\n2: (c\n", 100);
         assert_eq!(plans, ["0: (a\n1: (b)\n"]);
     }

@@ -183,7 +183,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_name_with_parentheses_and_spaces_does_not_confuse() {
+    fn process_name_may_contain_parentheses_and_spaces() {
         let text = "7 (a) b (c) S 3 5 5 0 -1 4194304 1 0 0 0 5 6 7 8 20 0 1 0 987 1000 42 18446";
         let status = parse(text).unwrap();
         assert_eq!((status.parent, status.group), (3, 5));
@@ -193,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn this_process_is_among_all() {
+    fn all_processes_include_this_one() {
         let own = i32::try_from(std::process::id()).unwrap();
         assert!(all().contains_key(&own));
     }

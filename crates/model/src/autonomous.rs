@@ -23,7 +23,7 @@ pub struct Event {
     pub name: String,
     /// The parameters. There is a ground event for each combination of their objects.
     pub parameters: Vec<Variable>,
-    /// Condition that triggers it.
+    /// Condition that triggers the event.
     pub condition: Condition,
     /// Effects. Their guards have only the part `now`.
     pub effects: Vec<Effect>,

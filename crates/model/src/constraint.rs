@@ -1,4 +1,4 @@
-//! Constraints on the course of a plan, and preferences (PDDL 3).
+//! Trajectory constraints, and preferences (PDDL 3).
 //!
 //! Gerevini, Haslum, Long, Saetti & Dimopoulos, "Deterministic planning in the fifth international
 //! planning competition: PDDL3 and experimental evaluation of the planners", AIJ 173 (2009).
@@ -101,7 +101,7 @@ impl<C> Modal<C> {
 /// An entry of `:constraints`, or a preference of the goal. The latter is a constraint at the end.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Constraint {
-    /// A constraint on the course of the plan.
+    /// A trajectory constraint.
     Modal(Modal<Condition>),
     /// All of them.
     And(Vec<Constraint>),

@@ -106,7 +106,7 @@ pub struct Problem {
     pub goal: Condition,
     /// Names of all preferences. Those without a name are called `anonymous`.
     pub preferences: Vec<String>,
-    /// Constraints on the course of the plan: the domain's, then the goal's preferences, then the
+    /// Trajectory constraints: the domain's, then the goal's preferences, then the
     /// problem's.
     pub constraints: Vec<Constraint>,
     /// Number of constraints of the domain among the constraints.

@@ -19,7 +19,7 @@ impl Situation {
     /// Its initial state is the situation's state, and its timed initials are the pending ones,
     /// shifted. Facts and fluents keep their numbers. Running actions are not part of it; a plan
     /// contains their remaining parts, see [`Situation::remaining_plan`]. [`Task::problem`] is still
-    /// the original problem, with its initial facts and times. Constraints on the course of the
+    /// the original problem, with its initial facts and times. Trajectory constraints of the
     /// whole plan, other than [deadlines](Task::with_deadlines), cannot be evaluated from here; the
     /// validator reports this.
     #[must_use]

@@ -129,8 +129,7 @@ impl Task {
         &self.goal
     }
 
-    /// Returns the constraints on the course of a plan and the preferences about it, including
-    /// those of the goal.
+    /// Returns the trajectory constraints and all preferences, including those of the goal.
     pub fn constraints(&self) -> &Constraints {
         &self.constraints
     }

@@ -12,7 +12,7 @@
 //!   happening group in between, the state after the group counts.
 //! - Happenings that interfere ([`Footprint`](crate::Footprint)) are at least [`Task::epsilon`]
 //!   apart. This includes timed initials, but two of these may be closer to each other.
-//! - Constraints on the course ([`Modal`](crate::Modal)) are evaluated at the end of the plan. The
+//! - Trajectory constraints ([`Modal`](crate::Modal)) are evaluated at the end of the plan. The
 //!   state at a moment is the one after all happenings of the moment; the initial state counts as
 //!   well.
 //! - Processes and events (PDDL+) happen without actions of the plan. An event happens as soon as

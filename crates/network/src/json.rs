@@ -316,7 +316,7 @@ mod tests {
     }
 
     #[test]
-    fn infinities_and_numbers_stay_as_they_are_written() {
+    fn infinities_and_numbers_keep_their_spelling() {
         let text = r#"{"a": [1.50, -Infinity, Infinity, 2e3], "b": "inf", "a": null}"#;
         let json = parse(text, &mut Report::new(&text.into())).expect("right");
         assert!(matches!(

@@ -347,7 +347,7 @@ pub struct Slider {
     /// The value as planned.
     pub nominal: String,
     /// Interval of guaranteed values, as text.
-    pub room: String,
+    pub guaranteed: String,
     /// Lower end of the slider.
     pub from: String,
     /// Upper end of the slider.

@@ -238,10 +238,14 @@ fn failure(example: &Counterexample, texts: &mut Texts) -> Vec<Section> {
 }
 
 /// The plan as a chart.
-pub(crate) fn chart(timeline: &Timeline, rooms: &[LimitedRange], texts: &mut Texts) -> Chart {
-    let by_name: BTreeMap<&str, &LimitedRange> = rooms
+pub(crate) fn chart(
+    timeline: &Timeline,
+    limited_ranges: &[LimitedRange],
+    texts: &mut Texts,
+) -> Chart {
+    let by_name: BTreeMap<&str, &LimitedRange> = limited_ranges
         .iter()
-        .map(|room| (room.range.quantity.name.as_str(), room))
+        .map(|limited| (limited.range.quantity.name.as_str(), limited))
         .collect();
     let time = |action: &TimedAction| {
         let end = action.end.as_ref().unwrap_or(&action.start);
@@ -264,7 +268,7 @@ pub(crate) fn chart(timeline: &Timeline, rooms: &[LimitedRange], texts: &mut Tex
     } = lanes(&occupants, &type_of);
     let mut bars = Vec::with_capacity(timeline.actions.len());
     for (action, lanes) in timeline.actions.iter().zip(of) {
-        let room = action
+        let limited = action
             .parameter
             .as_deref()
             .and_then(|name| by_name.get(name));
@@ -274,7 +278,7 @@ pub(crate) fn chart(timeline: &Timeline, rooms: &[LimitedRange], texts: &mut Tex
             starts: band(&action.start_window),
             ends: action.end_window.as_ref().and_then(band),
             lanes,
-            details: details(action, room.copied(), texts),
+            details: details(action, limited.copied(), texts),
             ..Bar::default()
         });
     }
@@ -341,7 +345,7 @@ pub(crate) fn window_words(window: &WindowAnswer) -> Option<String> {
 
 fn details(
     action: &TimedAction,
-    room: Option<&LimitedRange>,
+    limited: Option<&LimitedRange>,
     texts: &mut Texts,
 ) -> Vec<(&'static str, Text)> {
     let mut details: Vec<(&'static str, Text)> = Vec::new();
@@ -359,25 +363,25 @@ fn details(
             details.push((label, words.into()));
         }
     }
-    let Some(room) = room else {
+    let Some(limited) = limited else {
         if let Some(end) = &action.end {
             details.push(("takes", nearest(&(&end.0 - &action.start.0)).into()));
         }
         return details;
     };
-    let nominal = &room.range.quantity.nominal;
-    let (lower, upper) = ends(&room.range);
+    let nominal = &limited.range.quantity.nominal;
+    let (lower, upper) = ends(&limited.range);
     details.push(("takes", nearest(nominal).into()));
     details.push((
         "may take",
-        format!("{lower} to {upper} ({})", room.range.quantity.name).into(),
+        format!("{lower} to {upper} ({})", limited.range.quantity.name).into(),
     ));
-    if let Some(timeout) = &room.range.timeout {
+    if let Some(timeout) = &limited.range.timeout {
         details.push(("times out after", nearest(timeout).into()));
     }
     let limits = [
-        ("lower limit", &room.lower_limit),
-        ("upper limit", &room.upper_limit),
+        ("lower limit", &limited.lower_limit),
+        ("upper limit", &limited.upper_limit),
     ];
     for (label, limit) in limits {
         if let Some(limit) = limit {

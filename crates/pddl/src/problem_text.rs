@@ -59,7 +59,7 @@ pub enum WriteProblemError {
         /// The possible durations.
         possible: String,
     },
-    /// The course of the plan is constrained, and has begun.
+    /// There are trajectory constraints, and the plan has begun.
     #[error(
         "a problem file cannot express the states so far, on which the problem's trajectory \
          constraints depend"
@@ -82,7 +82,7 @@ pub enum WriteProblemError {
 /// order of facts.
 ///
 /// Facts that follow from rules are not written. The goal's preferences are written among the
-/// constraints. In mid-execution, preferences about the course of the plan are omitted, as is a
+/// constraints. In mid-execution, preferences about the trajectory are omitted, as is a
 /// metric that counts violations, because the file cannot state past violations.
 ///
 /// # Errors

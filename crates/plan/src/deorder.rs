@@ -124,8 +124,8 @@ pub fn deorder(task: &Task, plan: &TimeTriggeredPlan) -> Result<Deordered, Deord
     deorder_ignoring_processes(task, plan)
 }
 
-/// Like [`deorder`], but ignores processes and events, and, if there are any, constraints on the
-/// course. These may need more than the constraints of the result.
+/// Like [`deorder`], but ignores processes, events and trajectory constraints. These may need more
+/// than the constraints of the result.
 ///
 /// # Errors
 /// As for [`deorder`], except for these features.

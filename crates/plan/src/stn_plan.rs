@@ -140,7 +140,8 @@ pub enum Reason {
     /// The same for a condition that compares numbers and a happening that increases or decreases
     /// one. Whether this constraint is needed depends on the numbers.
     Side,
-    /// A constraint on the course of the plan keeps turns in their order, or bounds their times.
+    /// A trajectory constraint keeps the changes of its facts in their order, or bounds their
+    /// times.
     TrajectoryConstraint,
     /// Fixed at, or near, the difference in the original plan, because of numeric conditions.
     Pinned,

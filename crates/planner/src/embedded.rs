@@ -14,7 +14,7 @@
 //!    that are not yet fixed form a small network (`network`).
 //! 3. `relaxed` estimates the distance to the goal.
 //! 4. `extract` turns the choices into a plan with times, and passes it to the validator.
-//! 5. `course` compiles constraints on the course of a plan into conditions and goals beforehand.
+//! 5. `trajectory` compiles trajectory constraints into conditions and goals beforehand.
 //! 6. `run` divides the time among searches: first for any plan, then for better ones.
 //! 7. `refine` improves the best plan.
 
@@ -111,7 +111,7 @@ pub fn plan(
     )
 }
 
-/// As [`plan`], for a task without constraints on the course of its plans. `constrained` is the
+/// As [`plan`], for a task without trajectory constraints. `constrained` is the
 /// same task with constraints, and its situation; plans that violate them are not accepted.
 fn search_for_plans(
     task: &Task,

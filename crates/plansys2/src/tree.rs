@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn a_part_of_a_goal_is_a_tree_under_one_and() {
+    fn sub_goal_is_wrapped_in_a_single_and() {
         for part in [
             "(at r1 gate)",
             "(done)",

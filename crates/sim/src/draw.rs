@@ -204,7 +204,7 @@ mod tests {
     use rand::Rng;
 
     #[test]
-    fn each_part_of_the_key_matters_and_nothing_else() {
+    fn draw_depends_on_each_part_of_its_key() {
         let number = |seed, name: &str, occurrence, purpose| {
             keyed(seed, name, occurrence, purpose).random::<u64>()
         };
@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn old_seeds_mean_the_worlds_they_always_meant() {
+    fn recorded_seeds_give_unchanged_draws() {
         let number = keyed(7, "(drive rover depot shelf)", 0, Purpose::Duration).random::<u32>();
         insta::assert_snapshot!(number);
     }

@@ -65,7 +65,7 @@ struct CommandedStart {
 }
 
 impl<'a, P: DurationController> ControlledWorld<'a, P> {
-    /// Combines a world and a pace.
+    /// Combines a world and a duration controller.
     pub fn new(world: SimWorld<'a>, pace: P) -> Self {
         Self {
             world,
@@ -81,12 +81,12 @@ impl<'a, P: DurationController> ControlledWorld<'a, P> {
         &self.world
     }
 
-    /// Returns the pace.
+    /// Returns the duration controller.
     pub fn controller(&self) -> &P {
         &self.controller
     }
 
-    /// Notifies the pace that a commanded action has started.
+    /// Notifies the duration controller that a commanded action has started.
     fn begin(&mut self, ticket: ActionHandle, time: &Rational, is_open: bool) {
         if let Some(ordered) = self.ordered.remove(&ticket) {
             let begun = StartedAction {
@@ -166,7 +166,7 @@ impl<P: DurationController> World for ControlledWorld<'_, P> {
     }
 }
 
-/// A pace with durations that are fixed in advance, for each start of an action.
+/// A duration controller with a duration fixed in advance for each start of an action.
 #[derive(Clone, Debug, Default)]
 pub struct FixedDurations {
     /// For each action's name, its durations in order of its starts.
@@ -176,8 +176,8 @@ pub struct FixedDurations {
 }
 
 impl FixedDurations {
-    /// Creates a pace. `durations` has, for each action's name, its durations in order of its
-    /// starts; further starts take the planned duration.
+    /// Creates the controller. `durations` has, for each action's name, its durations in order of
+    /// its starts; further starts take the planned duration.
     pub fn new(durations: BTreeMap<String, Vec<Rational>>) -> Self {
         let ends = BTreeMap::new();
         Self { durations, ends }

@@ -45,7 +45,7 @@ impl WorldModel {
 impl WorldModel {
     /// Creates a sample of the world that continues from a belief: [`SimWorld::mid_execution`], with the
     /// model's reliability of reports.
-    pub fn world_amid(
+    pub fn world_in_mid_execution(
         &self,
         belief: &BeliefState,
         seed: u64,

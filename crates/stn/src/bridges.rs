@@ -269,7 +269,7 @@ mod tests {
     }
 
     #[test]
-    fn a_long_chain_there_and_back_is_all_bridges() {
+    fn every_edge_of_a_chain_in_both_directions_is_a_bridge() {
         const COUNT: usize = 20_000;
         let there = (1..COUNT).map(|index| (index - 1, index));
         let back = (1..COUNT).map(|index| (index, index - 1));

@@ -16,7 +16,7 @@
 //!   before the action, after it, or inside it in a fixed order; or the condition is a fact that is
 //!   established before the action, and changed only before that point or after the action; or the condition
 //!   cannot fail at any moment inside the action, for each set of writers that can come before that moment.
-//! - The points that change facts in constraints on the course of the plan keep their order and,
+//! - The points that change facts in trajectory constraints keep their order and,
 //!   where the constraint has times, their bounds ([`TrajectoryDerivation`]).
 //! - Durations are parameters, or those that the domain allows. Timed initials happen at their times. Initial
 //!   values are parameters or those of the problem.
@@ -26,7 +26,7 @@
 //!
 //! **Every inequality on boxes is needed.** Each bound of the network keeps the plan's order of two interfering
 //! happenings, of an action and a writer that its over-all condition depends on, or of two instances of one action,
-//! which are not to overlap; or a constraint on the course of the plan needs it; or it sets a duration or the time of
+//! which are not to overlap; or a trajectory constraint needs it; or it sets a duration or the time of
 //! timed initials. Each inequality that the certificate only states follows from a condition on numbers or from a
 //! separation:
 //! in a box that breaks it, there are values for which each schedule breaks the condition, or there is none. This
@@ -197,7 +197,8 @@ pub(crate) fn check(
         }
         known.push(failure);
     }
-    // Plans with other decisions may be valid. Conditions then imply nothing about their boxes.
+    // If plans with other decisions may be valid, the conditions imply nothing about boxes that
+    // contain such decisions.
     let of_all_boxes = if histories.needs_decisions(&mut widest) {
         known.as_slice()
     } else {
@@ -317,7 +318,7 @@ pub(crate) struct Quantity {
     pub(crate) action: Option<String>,
 }
 
-/// The kind of a bound between two time points, which is the only kind of time that may be negative.
+/// The kind of a bound between two time points. Times of all other kinds are not negative.
 pub(crate) const BOUND: &str = "bound";
 
 impl Quantity {

@@ -1,7 +1,7 @@
 //! Check that no box has a greater probability that all parameters are inside, by sums of linear
 //! bounds on logarithms of probabilities.
 //!
-//! The bounds are those of [`elbowroom_num::chance`]: the probability of an interval is log-concave
+//! The bounds are those of [`elbowroom_num::log_concave`]: the probability of an interval is log-concave
 //! in its ends for a log-concave density (Prékopa 1973). A jump counts in full where a case does
 //! not exclude it.
 
@@ -79,7 +79,8 @@ impl VariableDistributions {
                 span.least = span.least.clone().max(least);
                 gains[variable] = Some(match gains[variable].take() {
                     None => most,
-                    // The range ends when none of the ends that the variable moves gains any more.
+                    // The range ends where no end that the variable moves increases the probability
+                    // any more.
                     Some(other) => other.zip(most).map(|(one, other)| one.max(other)),
                 });
             }

@@ -153,7 +153,7 @@ fn mistake_gives_exactly_one_message() {
 }
 
 #[test]
-fn names_of_days_cannot_be_defined_anew() {
+fn names_of_days_cannot_be_redefined() {
     let window = "[[window]]\nfact = \"(open bakery)\"\nhours = \"8 to 17\"\n";
     for name in [
         "mon",

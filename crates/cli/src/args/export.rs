@@ -19,8 +19,8 @@ text, and to one that ends in .json, as Elbowroom JSON, exactly. The other forma
 a change of the unit of time is reported.\n\n\
 docs/second-witness.md describes the formats and how to check them with other programs.")]
 pub(crate) struct ExportArgs {
-    /// The output: the network as an STNU, the box or region as SMT-LIB 2, what the best
-    /// executor can reach as a process of PRISM, or the problem with its calendar as PDDL
+    /// The output: the network as an STNU, the box or region as SMT-LIB 2, the optimum
+    /// over all executors as a decision process for PRISM, or the problem with its calendar as PDDL
     #[arg(value_name = "FORMAT", value_enum)]
     pub(crate) format: ExportFormat,
     #[command(flatten)]
@@ -78,7 +78,7 @@ pub(crate) struct ProcessArgs {
     /// Largest number of actions that run at the same time (without time; no limit by default)
     #[arg(long, value_name = "N")]
     pub(crate) most_running: Option<usize>,
-    /// An action fails as soon as one of its conditions over all is violated (without time)
+    /// An action fails as soon as its over-all condition is violated (without time)
     #[arg(long)]
     pub(crate) keep_over_all: bool,
     /// Number of cells of the time axis (on a clock; 32 by default)
@@ -120,7 +120,7 @@ impl FromStr for DeadEndRule {
 /// A format that others read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ExportFormat {
-    /// The plan's network, durations and deadlines in the box left to the world
+    /// The plan's network, in which the world decides durations and deadlines within the box
     Stnu,
     /// The guarantee of the plan in the box, or the region, as a formula
     Smt2,

@@ -37,13 +37,13 @@ pub(crate) struct LearnArgs {
     /// them
     #[arg(long, value_name = "P", requires_all = ["domain", "problem", "plan"])]
     pub(crate) inside: Option<Rational>,
-    /// The domain of that plan, in PDDL
+    /// The domain of the plan of --plan, in PDDL
     #[arg(long, value_name = "FILE", requires = "inside")]
     pub(crate) domain: Option<PathBuf>,
-    /// The problem of that plan, in PDDL
+    /// The problem of the plan of --plan, in PDDL
     #[arg(long, value_name = "FILE", requires = "inside")]
     pub(crate) problem: Option<PathBuf>,
-    /// That plan
+    /// The plan, for --inside
     #[arg(long, value_name = "FILE", requires = "inside")]
     pub(crate) plan: Option<PathBuf>,
     /// Guarantee that the plan must have in the intervals

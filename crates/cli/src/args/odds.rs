@@ -34,7 +34,7 @@ pub(crate) struct OddsArgs {
     /// State of an effect that fails
     #[arg(long, value_enum, default_value_t = SemanticsChoice::Paper)]
     pub(crate) semantics: SemanticsChoice,
-    /// Also list the facts that each happening and the rest of the plan need
+    /// Also list, for each happening, the facts that it and the following ones need
     #[arg(long)]
     pub(crate) layers: bool,
     /// A world on a clock (docs/formats/world.md): execute the plan in samples of it

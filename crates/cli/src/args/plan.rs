@@ -33,7 +33,8 @@ pub(crate) struct PlanArgs {
     pub(crate) first: bool,
     /// Compare plans by this in place of metric and makespan: `slack`, the deviation that all durations
     /// may have at the same time, in relation to their nominal values (docs/chosen-plans.md), or
-    /// `probability`, the share of --world samples with success. Without a time limit, a fixed number of plans is compared
+    /// `probability`, the share of successful samples of --world. Without a time limit, a fixed
+    /// number of plans is compared
     #[arg(long, value_parser = plan_objective(), conflicts_with = "first")]
     pub(crate) objective: Option<PlanObjective>,
     /// The world file (docs/formats/world.md) for --objective probability

@@ -104,7 +104,7 @@ pub(crate) struct RunArgs {
     #[arg(allow_negative_numbers = true)]
     #[arg(requires = "programs")]
     pub(crate) answer_within: Rational,
-    /// Number of restarts of that program after it has ended or failed. It reports the actions that
+    /// Number of restarts of the program of --world-process after it has ended or failed. It reports the actions that
     /// were running; those that it does not know count as failed
     #[arg(long, value_name = "N", default_value = "0", requires = "programs")]
     #[arg(allow_negative_numbers = true)]
@@ -162,9 +162,9 @@ pub(crate) struct RunArgs {
     #[arg(long, value_name = "MB", default_value = "1000", value_parser = clap::value_parser!(u64).range(1..1_000_000))]
     pub(crate) planner_memory: Option<u64>,
     /// Time-out of each action, from its start or its last progress: `none`, a number of seconds, or
-    /// `10x,600`, the default: 10 times the planned duration, at least 600; and others for some actions:
-    /// `10x,600; drive=40; (pick a)=3x,5`. `learn` prints those that follow from logs. An action that
-    /// reaches it is cancelled, after a warning
+    /// `10x,600`, the default: 10 times the planned duration, at least 600; with exceptions for some
+    /// actions: `10x,600; drive=40; (pick a)=3x,5`. `learn` prints the time-outs that follow from logs.
+    /// An action that reaches its time-out is cancelled, after a warning
     #[arg(long, value_name = "RULE", value_parser = timeout, default_value_t)]
     #[arg(hide_default_value = true, allow_negative_numbers = true)]
     pub(crate) timeout: TimeoutRule,
@@ -278,9 +278,9 @@ impl RunArgs {
 /// By what the first plan is chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum FirstPlanChoice {
-    /// Its length, or the problem's metric
+    /// The planner's own plan, the best by length or by the problem's metric
     Shortest,
-    /// Its probability
+    /// The plan with the greatest success probability
     Likeliest,
 }
 

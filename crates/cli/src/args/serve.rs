@@ -25,7 +25,7 @@ its requests.")]
     .help("Number of new plans that may be made before the executive is idle and waits for a change")))]
 #[command(mut_arg("realtime", |it| it
     .help("Run a simulated world FACTOR times as fast as the wall clock (0.000001 to 1000000000); \
-           by default as fast. A world process has a clock of its own")))]
+           by default 1. A world process has a clock of its own")))]
 #[command(mut_arg("serve", |it| it.hide(true)))]
 #[command(mut_arg("token", |it| it
     .requires(Resettable::Reset)

@@ -10,7 +10,7 @@ use super::number::positive;
 #[derive(Args, Debug)]
 #[command(after_help = "\
 The check starts the first two durative actions of the plan: one runs to its end, one is \
-cancelled, and two run at the same time. A robot moves. Without a plan, the check starts \
+cancelled, and two run at the same time. A real robot moves. Without a plan, the check starts \
 `(wait-a-second)`. A program that claims `resume` is killed during an action and restarted.
 
 Exit codes: 0 no violations; 1 violations; 2 the world cannot be started.")]

@@ -7,7 +7,7 @@ use elbowroom::num::Rational;
 use elbowroom::planner::Answer;
 
 use crate::first_plan;
-use crate::sums::Sums;
+use crate::statistics::Sums;
 
 const LIMIT: Duration = Duration::from_secs(1);
 

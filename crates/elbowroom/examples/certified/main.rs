@@ -21,7 +21,7 @@
 
 mod changed;
 mod situations;
-mod sums;
+mod statistics;
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -32,7 +32,7 @@ use elbowroom::model::{Situation, Task};
 use elbowroom::pddl::read_problem;
 use elbowroom::planner::{Answer, Settings, plan};
 use elbowroom::text::Source;
-use sums::Sums;
+use statistics::Sums;
 
 /// Time limit of the planner.
 const LIMIT: Duration = Duration::from_secs(2);

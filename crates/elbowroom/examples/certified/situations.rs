@@ -11,7 +11,7 @@ use elbowroom::num::{Interval, Rational};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::sums::Sums;
+use crate::statistics::Sums;
 use crate::{first_plan, task};
 
 /// Domain and problem, relative to the folder.

@@ -25,6 +25,7 @@
 #![allow(dead_code, reason = "the test uses the rest")]
 
 mod boxes;
+mod deviations;
 mod grow;
 mod lateness;
 mod nominal;
@@ -32,7 +33,6 @@ mod options;
 mod planning;
 mod runs;
 mod sources;
-mod strain;
 mod subject;
 mod tally;
 mod trial;

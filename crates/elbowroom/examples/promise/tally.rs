@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use elbowroom::execution::GuaranteeLevel;
 use elbowroom::execution::run::TimeoutRule;
 
-use super::strain::Stray;
+use super::deviations::Stray;
 use super::trial::{Outcome, Ready};
 use super::worlds::{Kind, Worlds};
 

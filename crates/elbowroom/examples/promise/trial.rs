@@ -17,8 +17,8 @@ use elbowroom::pipeline;
 use elbowroom::plan::DecoupledEnvelope;
 use elbowroom::sim::{SimWorld, WorldModel};
 
+use super::deviations::{Course, Stray};
 use super::lateness;
-use super::strain::{Course, Stray};
 use super::subject::Subject;
 
 /// Plan, prepared for every executor.

@@ -14,7 +14,7 @@ use elbowroom::sim::{ControlledWorld, FixedDurations, SimWorld, WorldModel};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::strain::Lagging;
+use super::deviations::Lagging;
 
 /// Distribution of the durations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -154,7 +154,7 @@ impl EnvelopeRequest {
 /// is the box found so far.
 ///
 /// # Errors
-/// When the request names things that the plan does not have, or the plan is beyond exact analysis.
+/// When the request names quantities that the plan does not have, or the plan is beyond exact analysis.
 pub fn envelope(
     request: &EnvelopeRequest,
     watcher: &mut dyn Observer,
@@ -258,7 +258,7 @@ pub fn partial_result(
 /// dispatcher to enforce.
 ///
 /// # Errors
-/// When the validator rejects the plan, the request names things that the plan does not have, or
+/// When the validator rejects the plan, the request names quantities that the plan does not have, or
 /// the problem has processes or events.
 pub fn parametrized_plan(
     request: &EnvelopeRequest,
@@ -347,7 +347,7 @@ impl Subject<'_> {
             return Ok(());
         }
         let reason = &why_not.reason;
-        Err(PipelineError::Refused(Refusal::Nature {
+        Err(PipelineError::Refused(Refusal::Autonomous {
             place: place.to_owned(),
             obstacle: format!(
                 "processes and events may behave differently, and that case is not \

@@ -152,7 +152,7 @@ pub struct RegionSettings {
 /// there is a schedule for them or not.
 ///
 /// # Errors
-/// When the request names things that the plan does not have, or the plan is beyond exact analysis.
+/// When the request names quantities that the plan does not have, or the plan is beyond exact analysis.
 pub fn region(
     request: &EnvelopeRequest,
     settings: &RegionSettings,

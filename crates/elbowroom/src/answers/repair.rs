@@ -191,7 +191,7 @@ pub struct Change {
 /// changed problem, and the box check accepts its values.
 ///
 /// # Errors
-/// When the request names things that the plan does not have, or the plan is beyond exact analysis.
+/// When the request names quantities that the plan does not have, or the plan is beyond exact analysis.
 pub fn repair(
     request: &RepairRequest,
     watcher: &mut dyn Observer,

@@ -3,16 +3,16 @@
 
 #![allow(clippy::print_stdout, reason = "counts are worth seeing")]
 
-mod chosen;
-mod course;
+mod chosen_durations;
 mod forgery;
 mod guards;
 mod labels;
-mod likely;
-mod moments;
+mod likely_boxes;
 mod networks;
 mod numbers_that_change;
+mod trajectory_constraints;
 mod windows;
+mod zero_durations;
 
 use crate::shared;
 use std::sync::Arc;

@@ -7,7 +7,6 @@ mod cases;
 mod ccmmz;
 mod certificates;
 mod chosen_plans;
-mod course_kept;
 mod deorder_sound;
 mod derived_certificates;
 mod execution;
@@ -42,4 +41,5 @@ mod shared;
 #[path = "../../../../testing/solvable/mod.rs"]
 mod solvable;
 mod stn_files;
+mod trajectory_constraints;
 mod wall_clock_times;

@@ -269,7 +269,7 @@ struct Count {
 
 fn in_words(refusal: &Refusal) -> String {
     match refusal {
-        Refusal::Nature { obstacle, .. } => obstacle.clone(),
+        Refusal::Autonomous { obstacle, .. } => obstacle.clone(),
         other => format!("{other:?}")
             .chars()
             .take_while(|c| c.is_alphanumeric())

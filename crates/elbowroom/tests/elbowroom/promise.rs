@@ -7,16 +7,16 @@
 #![allow(clippy::print_stdout, reason = "counts are worth seeing")]
 #![allow(dead_code, reason = "the program uses the rest")]
 
+#[path = "../../examples/promise/deviations.rs"]
+mod deviations;
+#[path = "../../examples/promise/handmade_plans.rs"]
+pub(crate) mod handmade_plans;
 #[path = "../../examples/promise/lateness.rs"]
 mod lateness;
-#[path = "../../examples/promise/own.rs"]
-pub(crate) mod own;
 #[path = "../../examples/promise/planning.rs"]
 mod planning;
 #[path = "../../examples/promise/sources.rs"]
 pub(crate) mod sources;
-#[path = "../../examples/promise/strain.rs"]
-mod strain;
 #[path = "../../examples/promise/subject.rs"]
 mod subject;
 #[path = "../../examples/promise/tally.rs"]
@@ -49,7 +49,7 @@ const SEARCH: Search<'static> = Search {
 
 /// Returns our own plans, and those of the cases.
 fn own_subjects() -> Vec<Subject> {
-    let mut subjects: Vec<Subject> = own::OWN
+    let mut subjects: Vec<Subject> = handmade_plans::OWN
         .iter()
         .map(|[name, domain, problem, plan]| {
             let subject = Subject::of_texts(["own", name], [domain, problem, plan]);
@@ -177,9 +177,9 @@ fn benchmark_sample_succeeds_inside_envelopes() {
     assert_kept_inside(&slice(), 40);
 }
 
-/// Returns the plan of that name in [`own::OWN`].
+/// Returns the plan of that name in [`handmade_plans::OWN`].
 fn own_plan(name: &str) -> Subject {
-    let found = own::OWN.iter().find(|own| own[0] == name);
+    let found = handmade_plans::OWN.iter().find(|own| own[0] == name);
     let [name, domain, problem, plan] = found.expect("a plan of that name");
     Subject::of_texts(["own", name], [domain, problem, plan]).expect("a correct test")
 }

@@ -7,7 +7,7 @@
     reason = "counts and times are worth seeing; nothing depends on them"
 )]
 
-mod grid;
+mod optimality;
 
 use crate::shared;
 use std::collections::BTreeMap;
@@ -161,7 +161,7 @@ fn kept_quantities_do_not_change_even_without_repair() {
 
 #[test]
 fn no_change_on_a_grid_is_cheaper() {
-    grid::compare();
+    optimality::compare();
 }
 
 /// Files of a benchmark plan.

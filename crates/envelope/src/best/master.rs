@@ -15,8 +15,8 @@ use crate::cut::Cut;
 pub(super) struct Span {
     pub(super) least: Rational,
     pub(super) most: Rational,
-    /// Like `most`, but for the values that the objective distinguishes, whatever the range of the
-    /// parameter.
+    /// Value above which the objective no longer changes. The range of the parameter, which also
+    /// limits `most`, has no influence on it.
     pub(super) objective_max: Rational,
     /// `true` if the variable is strictly less than `far`; linear programs allow it to be `most`.
     pub(super) is_open: bool,

@@ -5,7 +5,7 @@
 //! so it lies below its tangents, like the logarithm of a volume. Values with a positive
 //! probability (at cuts, and measured values) are either inside or outside. A case counts such a
 //! probability proportionally to the distance, and is split if that is too imprecise. The numbers
-//! are those of [`elbowroom_num::chance`].
+//! are those of [`elbowroom_num::log_concave`].
 
 use std::ops::ControlFlow;
 
@@ -43,9 +43,10 @@ struct TangentBound {
 /// `Σ ln P(the duration is inside its interval)`.
 pub(super) struct Probability {
     terms: Vec<Term>,
-    /// Weights of the variables when ends are moved out that do not change the probability.
+    /// Weights of the variables when those ends are moved out that do not change the probability.
     tie_weights: Vec<Rational>,
-    /// Greatest value of each variable that counts, whatever its parameter's range.
+    /// For each variable, the value above which the probability no longer changes. The range of its
+    /// parameter is ignored.
     max_counted: Vec<Rational>,
 }
 

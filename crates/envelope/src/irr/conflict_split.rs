@@ -127,8 +127,8 @@ impl Bounds {
         }
     }
 
-    /// Divides a conflict at the points that have a bound, on the side with more such points.
-    /// `None` if no point has a fixed time.
+    /// Splits a conflict at the points that have a bound, on the side with more such points. `None`
+    /// if no point has a fixed time.
     fn divide(
         &self,
         plan: &ParametrizedPlan,

@@ -131,8 +131,8 @@ impl Compiler<'_> {
                 return Ok(Progress::Split(split));
             }
             self.apply_happening(&mut run, node, obligations)?;
-            if let Some(nature) = &self.autonomous {
-                self.advance(nature, &mut run, obligations)?;
+            if let Some(autonomous) = &self.autonomous {
+                self.advance(autonomous, &mut run, obligations)?;
             }
             run.position += 1;
         }
@@ -291,11 +291,12 @@ impl Compiler<'_> {
                 continue;
             };
             for condition in body.over_all.conjuncts() {
-                // Conditions that depend on nature were compiled during the symbolic run.
+                // Conditions that depend on processes or events were compiled during the symbolic
+                // run.
                 if self
                     .autonomous
                     .as_ref()
-                    .is_some_and(|nature| nature.changes(self.task, condition))
+                    .is_some_and(|autonomous| autonomous.changes(self.task, condition))
                 {
                     continue;
                 }

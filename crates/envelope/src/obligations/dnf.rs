@@ -15,7 +15,7 @@ const MAX_ALTERNATIVES: usize = 4096;
 
 /// Wanted truth value of a condition.
 ///
-/// A comparison with an undefined number is neither true nor false (silent), and so are the
+/// A comparison with an undefined number is neither true nor false (undefined), and so are the
 /// conditions around it, unless their other parts decide.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum WantedTruth {
@@ -23,9 +23,9 @@ pub(crate) enum WantedTruth {
     True,
     /// It is false.
     False,
-    /// It is false or silent: a required condition is then violated.
+    /// It is false or undefined: a required condition is then violated.
     NotTrue,
-    /// It is true or silent.
+    /// It is true or undefined.
     NotFalse,
 }
 

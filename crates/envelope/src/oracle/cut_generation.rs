@@ -180,8 +180,8 @@ impl Oracle {
         }
     }
 
-    /// Returns the objection of a row to a box with one end moved out; `None` if it has to be
-    /// computed.
+    /// Returns the known objection of a row to a box with one end moved out; `None` if none is
+    /// stored and it has to be computed.
     fn objection_of_row(
         &self,
         (row, ground): (&Row, &Ground),

@@ -151,7 +151,7 @@ impl DefectFinder<'_> {
             Requirement::Defined { node } | Requirement::SingleUpdate { node, .. } => {
                 (BTreeSet::new(), true, vec![*node])
             }
-            Requirement::Nature { after, .. } => (BTreeSet::new(), true, vec![*after]),
+            Requirement::Autonomous { after, .. } => (BTreeSet::new(), true, vec![*after]),
             Requirement::Separation { first, second } => {
                 (BTreeSet::new(), false, vec![*first, *second])
             }

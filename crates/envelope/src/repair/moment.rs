@@ -30,10 +30,10 @@ pub(super) fn avoiding_alternatives(
         |node: &NodeId| schedule[start] < schedule[*node] && schedule[*node] < schedule[end];
     let events = over_all.events(false);
     let inside = events.iter().copied().filter(is_inside);
-    let mut turns: Vec<NodeId> = inside.collect();
-    turns.extend([start, end]);
-    turns.sort_by(|a, b| schedule[*a].cmp(&schedule[*b]));
-    turns.dedup_by(|a, b| schedule[*a] == schedule[*b]);
+    let mut times: Vec<NodeId> = inside.collect();
+    times.extend([start, end]);
+    times.sort_by(|a, b| schedule[*a].cmp(&schedule[*b]));
+    times.dedup_by(|a, b| schedule[*a] == schedule[*b]);
     if !over_all
         .assumptions
         .iter()
@@ -41,7 +41,7 @@ pub(super) fn avoiding_alternatives(
     {
         return Ok(None);
     }
-    for pair in turns.windows(2) {
+    for pair in times.windows(2) {
         let (since, until) = (pair[0], pair[1]);
         let has_happened = |node: NodeId| schedule[node] <= schedule[since];
         for case in over_all.cases(task, plan, false, &has_happened)? {

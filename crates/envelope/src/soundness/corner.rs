@@ -55,9 +55,9 @@ impl Corner {
         let mut expression = inequality.expression.with_values(&self.values);
         let mut is_strict = inequality.is_strict;
         for &(parameter, is_upper) in &self.infinite {
-            // As the parameter grows, its coefficient alone decides. The expression becomes
-            // negative if the coefficient can be negative (for a parameter that decreases:
-            // positive).
+            // As the parameter grows without limit, only its coefficient determines the sign of the
+            // expression: it becomes negative if the coefficient can be negative (if the parameter
+            // decreases without limit: if it can be positive).
             let coefficient = coefficient_of(&expression, parameter);
             if coefficient == Linear::default() {
                 continue;

@@ -78,8 +78,8 @@ struct ProofExporter<'a> {
 }
 
 impl ProofExporter<'_> {
-    /// Converts the proofs that a way to fail is impossible. They number differences along `known`,
-    /// then `own`.
+    /// Converts the proofs that a way of failing is impossible. The proofs number the differences:
+    /// first those of `known`, then those of `own`.
     fn impossible(
         &self,
         own: &[Difference],

@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn weights_add_up_and_compare_like_their_bounds() {
+    fn scaled_weights_add_and_compare_like_their_bounds() {
         let numbers = [(1, 1000), (-7, 3), (0, 1), (5, 1), (4999, 1000), (-1, 1000)]
             .map(|(numerator, denominator)| Rational::new(numerator, denominator));
         let scale = fitting(&numbers[..3], &numbers[3..]).unwrap();

@@ -328,7 +328,7 @@ fn a_counterexample_to_separation_has_the_happenings_in_order() {
 }
 
 #[test]
-fn a_least_duration_beside_an_open_one_takes_no_corners() {
+fn fixed_minimum_besides_open_duration_needs_no_corner_search() {
     // Twenty sequential actions, each at least 1 long, with a deadline for all: small and large
     // durations are violations, but each small one independently.
     let count = 20;

@@ -49,7 +49,7 @@ fn query_of_other_box_keeps_accepted_state() {
 }
 
 #[test]
-fn queries_are_counted_without_the_return() {
+fn return_to_accepted_box_is_not_counted_as_query() {
     let (task, plan) = RELAY.task_and_plan();
     let mut oracle = oracle(&task, &plan).unwrap();
     assert_eq!(oracle.start(&envelope("[1, 1] [1, 1]")), Ok(None));
@@ -59,7 +59,7 @@ fn queries_are_counted_without_the_return() {
 }
 
 #[test]
-fn widening_to_shorter_reach_keeps_end() {
+fn widening_within_accepted_interval_keeps_end() {
     let (task, plan) = RELAY.task_and_plan();
     let mut oracle = oracle(&task, &plan).unwrap();
     let accepted = envelope("[1, 4] [1, 4]");

@@ -37,9 +37,9 @@ pub(super) const REGISTERED: ExecutorEntry = ExecutorEntry {
               remaining plan, with the observed values fixed. It replans only when the remaining \
               plan fails even without further deviations. If time or a number is insufficient and \
               no other plan is found, it continues by the plan's orderings, without a guarantee, \
-              as `esterel` does; likewise with a plan that is found again after durations have \
-              broken it twice. With a number, it also replans while no action is running and \
-              another plan is more likely to succeed, by at least that number of percentage \
+              as `esterel` does. It does the same if planning returns a plan that was already \
+              abandoned twice because of durations. `live:X` also replans while no action is \
+              running and another plan is more likely to succeed, by at least X percentage \
               points, in the world that the world file describes.",
     paper: "goes beyond Cashmore et al. (2020)",
     needs: Needs {

@@ -86,7 +86,7 @@ pub(super) enum PendingStep {
 /// A finished plan, which is adopted when its planning time has passed.
 pub(super) struct FinishedPlan {
     pub(super) course: StartedPlan,
-    /// The end of its planning time, on the world's clock.
+    /// The end of the time that planning takes, on the world's clock.
     pub(super) ready: Rational,
 }
 

@@ -143,7 +143,7 @@ fn has_proc() -> bool {
 }
 
 #[test]
-fn a_good_planner_gives_its_plan() {
+fn plan_of_successful_planner_is_returned() {
     let run = run(
         "echo noise; echo '0.5: (SELL) [5.000]'; echo more noise",
         30,
@@ -175,7 +175,7 @@ fn each_plan_is_reported_and_last_is_returned() {
 }
 
 #[test]
-fn plan_files_count_as_soon_as_they_are_there() {
+fn plan_file_is_read_as_soon_as_it_exists() {
     let script =
         "echo '0: (sell) [5]' > \"$3\"; echo '1: (sell) [5]' > \"$3_1.SOL\"; sleep 999.$TAG";
     let script = script.replace("$3_1", "${3}_1");
@@ -231,7 +231,7 @@ fn crash_is_reported_with_signal() {
 }
 
 #[test]
-fn a_plan_before_a_crash_is_a_plan() {
+fn plan_printed_before_crash_is_accepted() {
     let run = run("echo '0: (sell) [5]'; kill -SEGV $$", 30);
     assert_eq!(run.events, ["5"]);
     assert_eq!(run.report.statistics.ending, Some(Ending::Signalled(11)));

@@ -92,7 +92,7 @@ fn actions(plan: Option<&str>) -> Vec<String> {
 }
 
 #[test]
-fn lpg_delivers() {
+fn lpg_finds_valid_plan() {
     if !is_there("ELBOWROOM_LPG") {
         return;
     }
@@ -120,7 +120,7 @@ fn lpg_without_a_plan_gives_up_or_runs_out_of_time() {
 }
 
 #[test]
-fn aries_delivers_also_from_a_later_moment() {
+fn aries_plans_also_in_mid_execution() {
     if !is_there("ELBOWROOM_PYTHON") {
         return;
     }
@@ -135,7 +135,7 @@ fn aries_delivers_also_from_a_later_moment() {
 }
 
 #[test]
-fn aries_says_that_it_only_knows_integers() {
+fn aries_rejects_non_integer_numbers() {
     if !is_there("ELBOWROOM_PYTHON") {
         return;
     }

@@ -87,7 +87,7 @@ fn bounds(
         .map_err(|why| why.to_string()))
 }
 
-/// Number of units in 1. Bounds are added up in whole units.
+/// Bounds are added up as whole numbers of units; a probability of 1 is this number of units.
 const UNITS: f64 = 1e9;
 
 fn mean(bounds: &[Result<(f64, f64), String>]) -> ColumnOptimum {

@@ -70,7 +70,7 @@ impl LookaheadPolicy {
     }
 
     /// Returns `true` if a planner finds no plan from here. A state that is not in the table does
-    /// not count as a dead end. See [`Game::dead_ends`](super::TrialSetup::dead_ends).
+    /// not count as a dead end. See [`TrialSetup::dead_ends`](super::TrialSetup::dead_ends).
     pub fn is_dead_end(&self, state: &State, running: &[ActionName]) -> bool {
         let find = |name: &ActionName| self.instances.get(name).copied();
         let running: Option<Vec<InstanceId>> = running.iter().map(find).collect();

@@ -42,7 +42,9 @@ pub(super) fn evaluate_stratum<F: Clone>(
         let truth = holds(&rule.body, &derivation.with_derived_facts(basic, derived));
         match truth {
             Err(fault) => derived.set_unclear(rule.head, fault),
-            Ok(_) => unreachable!("the rule rests on something that says nothing"),
+            Ok(_) => {
+                unreachable!("the rule depends on an undefined part, so it cannot be evaluated")
+            }
         }
         true
     });

@@ -31,7 +31,10 @@ impl Rules {
         self.list
             .extend(bodies.into_iter().map(|body| GroundRule { head, body }));
         let before = self.by_head.insert(head, first..self.list.len());
-        debug_assert!(before.is_none(), "the rules of a head come at once");
+        debug_assert!(
+            before.is_none(),
+            "all rules of a head are added in one call"
+        );
     }
 
     /// Returns the rules with this head; none for a basic fact.

@@ -173,9 +173,9 @@ impl<'a> Judge<'a> {
             flow.at = at;
         }
         self.derived.take();
-        if let Some(nature) = &mut self.event_history {
-            nature.fired.clear();
-            nature.rounds = 0;
+        if let Some(history) = &mut self.event_history {
+            history.fired.clear();
+            history.rounds = 0;
         }
     }
 
@@ -277,7 +277,7 @@ impl<'a> Judge<'a> {
                 condition,
             );
             let (_, turn) = piece
-                .turn(condition)
+                .next_change(condition)
                 .map_err(|fault| self.to_abort(fault, &place))?;
             if let Some(turn) = turn
                 && next
@@ -323,7 +323,7 @@ impl<'a> Judge<'a> {
                     is_after: true,
                 };
                 let piece = self.piece(now, motion, length, Some(&part));
-                piece.turn(condition).map(|(holds, _)| holds)
+                piece.next_change(condition).map(|(holds, _)| holds)
             }
         };
         holds.map_err(|fault| {
@@ -371,12 +371,12 @@ impl<'a> Judge<'a> {
             }
         }
         self.derived.take();
-        if let Some(nature) = &mut self.event_history {
-            nature.rounds += 1;
+        if let Some(history) = &mut self.event_history {
+            history.rounds += 1;
             for &event in ready {
-                nature.fired.insert(event);
+                history.fired.insert(event);
                 let moment = (flow.base.clone(), flow.at.clone(), event);
-                nature.recent.push(moment);
+                history.recent.push(moment);
             }
         }
         Ok(())
@@ -384,27 +384,27 @@ impl<'a> Judge<'a> {
 
     /// Rejects an event that happens twice at a moment.
     fn reject_repeated_event(&self, flow: &Flow, ready: &[usize]) -> Result<(), Abort> {
-        let Some(nature) = &self.event_history else {
+        let Some(history) = &self.event_history else {
             return Ok(());
         };
-        let Some(&again) = ready.iter().find(|event| nature.fired.contains(event)) else {
+        let Some(&again) = ready.iter().find(|event| history.fired.contains(event)) else {
             return Ok(());
         };
         let mistake = ViolationKind::EndlessEvent {
             event: self.autonomous().events[again].name.clone(),
-            is_alone: nature.rounds == 1 && nature.fired.len() == 1,
+            is_alone: history.rounds == 1 && history.fired.len() == 1,
         };
         Err(self.violation(&flow.time(), None, mistake))
     }
 
     /// Rejects simultaneous events that interfere.
     fn refuse_interference(&self, flow: &Flow, ready: &[usize]) -> Result<(), Abort> {
-        let Some(nature) = &self.event_history else {
+        let Some(history) = &self.event_history else {
             return Ok(());
         };
         for (position, &second) in ready.iter().enumerate() {
             for &first in &ready[..position] {
-                let footprints = [first, second].map(|event| &nature.footprints[event]);
+                let footprints = [first, second].map(|event| &history.footprints[event]);
                 if !footprints[0].interferes_with(footprints[1]) {
                     continue;
                 }
@@ -467,7 +467,7 @@ impl<'a> Judge<'a> {
     /// Checks that happenings of the plan are at least ε after events before them. If no separation
     /// is needed, it is sufficient that the event comes first.
     pub(super) fn check_separation_from_events(&self, group: &Group<'a>) -> Result<(), Abort> {
-        let Some(nature) = self
+        let Some(history) = self
             .event_history
             .as_ref()
             .filter(|_| self.settings.needs_separation)
@@ -475,14 +475,14 @@ impl<'a> Judge<'a> {
             return Ok(());
         };
         let separation = self.task.epsilon();
-        for (base, at, event) in &nature.recent {
+        for (base, at, event) in &history.recent {
             for happening in &group.happenings {
                 let Some(step) = happening.kind.step() else {
                     continue;
                 };
                 let since = &happening.time - base;
                 let is_close = at.order(&Instant::exact(since - separation)) == Ordering::Greater;
-                let footprint = &nature.footprints[*event];
+                let footprint = &history.footprints[*event];
                 if !is_close || !footprint.interferes_with(&happening.footprint) {
                     continue;
                 }
@@ -502,11 +502,11 @@ impl<'a> Judge<'a> {
     /// Removes the events that are too far in the past for later happenings.
     fn forget_events_before(&mut self, time: &Rational) {
         let separation = self.task.epsilon();
-        if let Some(nature) = &mut self.event_history {
+        if let Some(history) = &mut self.event_history {
             let is_close = |(base, at, _): &(Rational, Instant, usize)| {
                 at.order(&Instant::exact(time - base - separation)) == Ordering::Greater
             };
-            nature.recent.retain(is_close);
+            history.recent.retain(is_close);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Track of one constraint on the course of a plan: when its conditions hold, and whether it is
+//! Track of one trajectory constraint: when its conditions hold, and whether it is
 //! satisfied.
 
 use std::cmp::Ordering;

@@ -39,7 +39,7 @@ pub(super) struct Judge<'a> {
     /// Last change of each fact: time and happening.
     pub(super) last_changes: BTreeMap<FactId, (Rational, HappeningKind<'a>)>,
     pub(super) margins: Margins,
-    /// Constraints on the course; `None` if there are none.
+    /// Trajectory constraints; `None` if there are none.
     pub(super) trajectory: Option<TrajectoryMonitor<'a>>,
     /// Preferences among the conditions of actions.
     pub(super) preferences: ActionPreferenceMonitor,
@@ -117,7 +117,7 @@ impl<'a> Judge<'a> {
         self.require(self.task.goal(), ConditionTime::Goal, None, &at_end)
     }
 
-    /// Records the state from `time` on for the constraints on the course.
+    /// Records the state from `time` on for the trajectory constraints.
     fn record_state(&mut self, time: &Rational) -> Result<(), Abort> {
         let Some(mut course) = self.trajectory.take() else {
             return Ok(());
@@ -143,7 +143,7 @@ impl<'a> Judge<'a> {
         Ok(())
     }
 
-    /// Records the changes until `length` later for the constraints on the course, in the given
+    /// Records the changes until `length` later for the trajectory constraints, in the given
     /// part.
     pub(super) fn record_phases(
         &mut self,

@@ -169,7 +169,10 @@ impl Segment<'_> {
 
     /// Returns the truth value of the condition right after the beginning of the part, and the
     /// first moment after that at which, or right after which, it changes.
-    pub(super) fn turn(&self, condition: &Condition) -> Result<(bool, Option<Instant>), Fault> {
+    pub(super) fn next_change(
+        &self,
+        condition: &Condition,
+    ) -> Result<(bool, Option<Instant>), Fault> {
         let reads_derived = self.derivation.is_read_by(condition);
         if !self.is_time_dependent(condition, reads_derived) {
             let view = self.view(None, Position::Point(Rational::ZERO));

@@ -1,4 +1,4 @@
-//! Constraints on the course of a plan: evaluation.
+//! Trajectory constraints: evaluation.
 //!
 //! For each constraint, the validator records the truth values of its conditions at the beginning,
 //! after each happening group, and, while numbers move, in each cell between two cuts (see

@@ -86,7 +86,7 @@ pub enum ViolationKind {
         /// state before them.
         too_late: Vec<Occurrence>,
     },
-    /// A constraint on the course of the plan is violated.
+    /// A trajectory constraint is violated.
     Constraint {
         /// The constraint in PDDL notation.
         constraint: String,
@@ -153,7 +153,7 @@ pub enum ConditionTime {
     End,
     /// The goal.
     Goal,
-    /// Constraint on the course of the plan.
+    /// Trajectory constraint.
     Trajectory,
 }
 

@@ -37,7 +37,7 @@ fn words(file: &NetworkFile) -> String {
 }
 
 #[test]
-fn nodes_and_constraints() {
+fn heatlab_nodes_and_constraints_are_read() {
     let file = sample("one.json");
     assert_eq!(file.format, Format::Heatlab);
     assert_eq!(file.points, ["0", "1", "2", "3"]);
@@ -60,7 +60,7 @@ fn nodes_and_constraints() {
 }
 
 #[test]
-fn time_points_with_labels_that_repeat_and_correlations() {
+fn repeated_labels_and_correlations_are_read() {
     let file = sample("two.json");
     assert_eq!(file.points, ["start", "(drive a)_end", "(drive a)_end #2"]);
     assert_eq!(file.reference, Some(NodeId(0)));
@@ -75,7 +75,7 @@ fn time_points_with_labels_that_repeat_and_correlations() {
 }
 
 #[test]
-fn contingent_edges_with_plain_and_with_labelled_values() {
+fn contingent_edges_with_and_without_labels_are_read() {
     let file = sample("three.stnu");
     assert_eq!(file.name, "kettle & cup");
     assert_eq!(file.reference, Some(NodeId(0)));
@@ -90,7 +90,7 @@ fn contingent_edges_with_plain_and_with_labelled_values() {
 }
 
 #[test]
-fn sections_of_plain_text() {
+fn sections_of_plain_text_are_read() {
     let file = sample("four.plainstnu");
     insta::assert_snapshot!(words(&file), @r"
     C at most 12.5 after X
@@ -171,7 +171,7 @@ fn minimal_network_contains_all_implied_bounds() {
 }
 
 #[test]
-fn other_kinds_are_refused_by_name() {
+fn unsupported_formats_are_rejected_with_their_names() {
     let conditional = samples::GRAPHML.replace(">STNU<", ">CSTNU<");
     let message = refused("f.stnu", &conditional);
     assert!(

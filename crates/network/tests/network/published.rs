@@ -40,7 +40,7 @@ fn read_file(path: &Path) -> Result<NetworkFile, String> {
 }
 
 #[test]
-fn every_file_of_a_supported_kind_is_read_and_the_others_are_refused_by_name() {
+fn every_file_of_a_supported_format_is_read_and_others_are_named_as_unsupported() {
     let Some(folder) = folder() else { return };
     let mut files = Vec::new();
     all_files(&folder, &mut files);

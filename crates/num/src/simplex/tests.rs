@@ -214,7 +214,7 @@ fn inequalities(count: Range<usize>) -> impl Strategy<Value = Vec<Inequality>> {
 }
 
 #[test]
-fn the_proof_of_an_optimum_adds_up_to_it() {
+fn optimality_proof_sums_to_the_objective() {
     let mut simplex = Simplex::new();
     let (x, y) = (simplex.add_variable(), simplex.add_variable());
     let sum = simplex.define(&[(x, Rational::ONE), (y, Rational::ONE)]);
@@ -283,7 +283,7 @@ proptest! {
     }
 
     #[test]
-    fn pop_restores_system(
+    fn pop_restores_bounds_of_lower_level(
         base in inequalities(1..5),
         levels in prop::collection::vec(inequalities(1..3), 1..4),
         checks in prop::collection::vec(any::<bool>(), 4),

@@ -1,4 +1,4 @@
 //! Integration tests of numbers: chances and normal distributions.
 
-mod chance;
+mod interval_probabilities;
 mod normal;

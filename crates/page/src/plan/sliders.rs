@@ -104,7 +104,7 @@ fn slider(reach: &SliderInterval<'_>) -> Slider {
         name: reach.quantity.name.clone(),
         quantity: reach.quantity.quantity.clone(),
         nominal: nominal.to_string(),
-        room: reach.words.clone(),
+        guaranteed: reach.words.clone(),
         from: decimal(&down(&from)),
         to: decimal(&(down(&to) + &step)),
         step: decimal(&step),

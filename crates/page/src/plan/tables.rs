@@ -29,24 +29,24 @@ fn columns(names: &[(&str, bool)]) -> Vec<(String, bool)> {
 }
 
 /// Builds the table of the envelope.
-pub(super) fn slack_table(rooms: &[LimitedRange], texts: &mut Texts) -> Table {
+pub(super) fn slack_table(limited_ranges: &[LimitedRange], texts: &mut Texts) -> Table {
     let mut limit = |limit: &Option<String>| match limit {
         Some(limit) => texts.share(limit),
         None => "".into(),
     };
-    let mut rows = Vec::with_capacity(rooms.len());
-    for room in rooms {
-        let (lower, upper) = ends(&room.range);
-        let quantity = &room.range.quantity;
+    let mut rows = Vec::with_capacity(limited_ranges.len());
+    for limited in limited_ranges {
+        let (lower, upper) = ends(&limited.range);
+        let quantity = &limited.range.quantity;
         rows.push(vec![
             quantity.name.as_str().into(),
             quantity.quantity.as_str().into(),
             nearest(&quantity.nominal).into(),
             lower.into(),
             upper.into(),
-            timeout(&room.range).into(),
-            limit(&room.lower_limit),
-            limit(&room.upper_limit),
+            timeout(&limited.range).into(),
+            limit(&limited.lower_limit),
+            limit(&limited.upper_limit),
         ]);
     }
     Table {

@@ -18,8 +18,8 @@ function slidersView(section, textOf, onTimes, onValues) {
     const input = element("input", { type: "range", id: `slider-${index}`, min: it.from, max: it.to, step: it.step, "data-slider": it.name,
       oninput: () => set(index, parsed(rounded(Number(input.value), 1e-6))) });
     const output = element("output", { for: `slider-${index}` });
-    const room = element("span", { class: "note" }, it.room);
-    const row = element("div", { class: "slider" }, element("label", { for: `slider-${index}` }, words(it.quantity)), output, input, room);
+    const guaranteed = element("span", { class: "note" }, it.guaranteed);
+    const row = element("div", { class: "slider" }, element("label", { for: `slider-${index}` }, words(it.quantity)), output, input, guaranteed);
     return { input, output, row };
   });
 

@@ -169,13 +169,13 @@ impl LimitPeriod {
     /// Returns the smallest distance of the number from the limit, and its time. The distance is
     /// negative if the limit is violated.
     fn smallest_distance(&self, points: &Points) -> Option<(Rational, Rational)> {
-        let room = |value: &Rational| match self.bound.side() {
+        let distance = |value: &Rational| match self.bound.side() {
             0 => None,
             -1 => Some(value - &self.bound.value),
             _ => Some(&self.bound.value - value),
         };
         if let Some(value) = &self.value {
-            return Some((room(value)?, self.from.clone()));
+            return Some((distance(value)?, self.from.clone()));
         }
         // The extremes of a piecewise linear function: just after the start, just before the end,
         // and at the points in between.
@@ -187,10 +187,10 @@ impl LimitPeriod {
         if after < before {
             values.extend_from_slice(&points[after..before]);
         }
-        let rooms = values
+        let distances = values
             .iter()
-            .map(|(time, value)| Some((room(value)?, time.clone())));
-        rooms.collect::<Option<Vec<_>>>()?.into_iter().min()
+            .map(|(time, value)| Some((distance(value)?, time.clone())));
+        distances.collect::<Option<Vec<_>>>()?.into_iter().min()
     }
 }
 
@@ -210,18 +210,18 @@ fn interpolate(points: &Points, position: usize, time: &Rational) -> Option<Rati
 
 /// Describes the point at which a number is closest to a limit.
 pub(super) fn describe_closest_point(limits: &[LimitPeriod], points: &Points) -> Option<String> {
-    let rooms = limits
+    let distances = limits
         .iter()
         .filter_map(|own| Some((own.smallest_distance(points)?, own)));
-    let ((room, time), own) = rooms.min_by(|(a, _), (b, _)| a.cmp(b))?;
+    let ((distance, time), own) = distances.min_by(|(a, _), (b, _)| a.cmp(b))?;
     let (time, words) = (nearest(&time), own.describe());
-    Some(if room.is_negative() {
+    Some(if distance.is_negative() {
         format!(
             "Limit violated at {time} by {}: it had to be {words}.",
-            nearest(&room.abs())
+            nearest(&distance.abs())
         )
     } else {
-        format!("Least slack at {time}: {} to {words}.", nearest(&room))
+        format!("Least slack at {time}: {} to {words}.", nearest(&distance))
     })
 }
 
@@ -323,22 +323,22 @@ mod tests {
     fn closest_point_is_extremum_or_end_of_limit() {
         // The number falls from 10 to 4 until time 3, jumps to 12, and falls to 0 until time 9.
         let points = [(0, 10), (3, 4), (3, 12), (9, 0)].map(|(a, b)| (number(a), number(b)));
-        let room = |limit: LimitPeriod| limit.smallest_distance(&points).expect("a room");
+        let distance = |limit: LimitPeriod| limit.smallest_distance(&points).expect("a distance");
         let least = |from, to| allowed(from, to, Comparison::AtLeast, 2);
         assert_eq!(
-            room(least(0, 3)),
+            distance(least(0, 3)),
             (number(2), number(3)),
             "just before it is filled"
         );
         assert_eq!(
-            room(least(3, 6)),
+            distance(least(3, 6)),
             (number(4), number(6)),
             "just after it was filled"
         );
-        assert_eq!(room(least(0, 9)), (number(-2), number(9)));
-        assert_eq!(room(least(1, 2)), (number(4), number(2)));
+        assert_eq!(distance(least(0, 9)), (number(-2), number(9)));
+        assert_eq!(distance(least(1, 2)), (number(4), number(2)));
         let most = allowed(0, 9, Comparison::AtMost, 20);
-        assert_eq!(room(most), (number(8), number(3)));
+        assert_eq!(distance(most), (number(8), number(3)));
         assert_eq!(
             allowed(0, 9, Comparison::Equal, 1).smallest_distance(&points),
             None

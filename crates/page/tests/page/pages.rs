@@ -123,19 +123,19 @@ fn envelope_page_lists_actions_and_intervals() {
         };
         assert_eq!(document.verdict.tone, Tone::Good);
         assert_eq!(chart(&document).bars.len(), steps, "{case}");
-        let rooms = &table(&document, "How far each quantity may deviate").rows;
-        assert_eq!(rooms.len(), parameters.len(), "{case}");
-        for (row, room) in rooms.iter().zip(parameters) {
-            assert_eq!(words(&document, &row[0]), room.range.quantity.name);
+        let table_rows = &table(&document, "How far each quantity may deviate").rows;
+        assert_eq!(table_rows.len(), parameters.len(), "{case}");
+        for (row, limited) in table_rows.iter().zip(parameters) {
+            assert_eq!(words(&document, &row[0]), limited.range.quantity.name);
             let cell =
                 |column: usize| -> Option<Rational> { words(&document, &row[column]).parse().ok() };
-            assert_eq!(cell(3).is_some(), room.range.lower.value().is_some());
-            let interval = room.range.interval();
+            assert_eq!(cell(3).is_some(), limited.range.lower.value().is_some());
+            let interval = limited.range.interval();
             for end in [cell(3), cell(4)].into_iter().flatten() {
                 assert!(interval.contains(&end), "{case}: {end} is rounded outwards");
             }
             let limit = words(&document, &row[7]);
-            assert_eq!(limit, room.upper_limit.as_deref().unwrap_or_default());
+            assert_eq!(limit, limited.upper_limit.as_deref().unwrap_or_default());
         }
     }
 }

@@ -55,7 +55,7 @@ const SUPPORTED: &[(&str, &str)] = &[
          `:constraint`, which must hold in each state",
     ),
     (
-        "Constraints on the course",
+        "Trajectory constraints",
         "`:constraints` of domain and problem (PDDL 3): `at end`, `always`, `sometime`, `within`, \
          `at-most-once`, `sometime-after`, `sometime-before`, `always-within`, `hold-during`, \
          `hold-after`, under `and`, `forall` and `preference`",
@@ -78,7 +78,7 @@ const SUPPORTED: &[(&str, &str)] = &[
         "Control parameters",
         "`:control (?cash - number)` of an action: numbers that the plan chooses. In a plan they \
          follow the objects: `0.0: (withdraw ann 12.5) [2]`. Read and validated; planner, \
-         networks, envelopes, repairs, odds and runs reject such domains by name",
+         networks, envelopes, repairs, odds and runs reject such domains",
     ),
     (
         "Object fluents",
@@ -100,7 +100,7 @@ states of a plan.
 - The state after the last happening and all timed initials lasts forever: `hold-during` and \
   `hold-after` may extend beyond the end of the plan.
 - `hold-during t u` and `hold-after t` also apply to the state that holds at `t`, which may have \
-  begun earlier. (VAL starts with the first state that begins in the window: [agreement with VAL](val-agreement.md#beside-val-itself).)
+  begun earlier. (VAL starts with the first state that begins in the window: [agreement with VAL](val-agreement.md#comparison-with-vals-program).)
 - Where numbers change continuously, all times count, not only those of happenings. Times are \
   compared exactly; if two of them are less than a millionth apart and one is irrational, the \
   constraint is undecided.
@@ -110,9 +110,9 @@ states of a plan.
 - A plan that violates a constraint is invalid, and the validator reports the time and the reason. In \
   mid-execution, the past states are unknown, so that constraints are undecided.
 - The embedded planner finds plans under all forms \
-  ([details](planners-embedded.md#constraints-on-the-course)). Networks and envelopes respect constraints on facts: the happenings that change them keep their order, and \
+  ([details](planners-embedded.md#trajectory-constraints)). Networks and envelopes respect constraints on facts: the happenings that change them keep their order, and \
   deadlines become bounds. Runs and other plans in mid-execution, STN plan files and odds do not \
-  support constraints, and reject them by name.
+  support constraints, and reject them.
 
 ";
 
@@ -141,7 +141,7 @@ The semantics are those of Fox & Long (*Modelling mixed discrete-continuous doma
 - A `:constraint` (of the dialect of ENHSP) is `(always condition)` for all its parameters.
 - `elbowroom envelope` accounts for events whose order is known and whose times are linear, and reports \
   the obstacle otherwise ([details](guarantees.md#processes-and-events)). The embedded planner, \
-  networks of plans, largest and exact envelopes, repairs, odds and runs reject such domains by name. \
+  networks of plans, largest and exact envelopes, repairs, odds and runs reject such domains. \
   External planners can be used, and their plans are validated.
 
 ";

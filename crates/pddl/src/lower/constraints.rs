@@ -13,7 +13,7 @@ use crate::lower::timed::Timed;
 use crate::syntax::Node;
 use elbowroom_text::nearest;
 
-/// Syntax of the constraints on the course of a plan.
+/// Syntax of the trajectory constraints.
 const MODALS: &[(&str, &str)] = &[
     ("always", "(always condition)"),
     ("sometime", "(sometime condition)"),

@@ -14,8 +14,8 @@ pub(super) struct Names {
     pub(super) predicates: BTreeMap<String, Vec<PredicateId>>,
     /// As for predicates.
     pub(super) functions: BTreeMap<String, Vec<FunctionId>>,
-    /// Functions whose values are objects, as the predicates that represent them. They may share a
-    /// name as functions may.
+    /// Functions whose values are objects, as the predicates that represent them. Like other
+    /// functions, several of them may have the same name.
     pub(super) object_functions: BTreeMap<String, Vec<PredicateId>>,
     pub(super) schemas: BTreeMap<String, SchemaId>,
 }

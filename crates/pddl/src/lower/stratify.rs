@@ -91,7 +91,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nodes_on_a_circle_share_a_component() {
+    fn nodes_on_a_cycle_share_a_component() {
         let component = components(&[vec![1], vec![2], vec![0, 3], vec![]]);
         assert_eq!(component[0], component[1]);
         assert_eq!(component[0], component[2]);

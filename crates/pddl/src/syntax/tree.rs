@@ -284,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn lists_nest() {
+    fn nested_lists_are_read() {
         assert_eq!(parsed("(a (b) c)").0, "[a [b] c]");
     }
 

@@ -1,4 +1,4 @@
-//! Constraints on the course of a plan, and the validator's verdicts on them.
+//! Trajectory constraints, and the validator's verdicts on them.
 
 #![allow(
     clippy::format_push_string,

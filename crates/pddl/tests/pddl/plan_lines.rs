@@ -161,7 +161,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(4000))]
 
     #[test]
-    fn line_that_is_nearly_an_action_is_read_or_named(
+    fn line_similar_to_an_action_is_read_or_reported(
         line in nearly_an_action(),
         at in 0..=PLAN.len(),
         head in log_text(),

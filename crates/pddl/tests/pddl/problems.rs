@@ -53,7 +53,7 @@ fn timed_initial_at_zero_belongs_to_initial_state() {
 }
 
 #[test]
-fn costs_begin_at_0() {
+fn total_cost_is_initially_0() {
     let domain = "(define (domain d) (:functions (total-cost))
         (:action work :parameters () :effect (increase (total-cost) 1)))";
     let read = |init: &str| {

@@ -68,8 +68,8 @@ pub(super) fn order(
                 order,
             );
         }
-        // Losing a moment at which a required condition is read never violates it. But an effect
-        // whose guard was false might take place then.
+        // If an interval contains fewer moments, a required condition is never violated. But an
+        // effect whose guard was false at one of these moments might then take place.
         let decisive = guards_throughout(task, body);
         let epsilon = task.epsilon();
         for (footprint, distance) in [(&required.other, &Rational::ZERO), (&decisive, epsilon)] {
@@ -120,9 +120,9 @@ pub(super) fn order(
     }
 }
 
-/// Returns `true` if two actions overlap, but neither is within the other. It is not useful to
-/// require that one ends before the other, or starts before it ends, or that they start or end at
-/// the same time.
+/// Returns `true` if two actions overlap, but neither is within the other. Then it is not useful to
+/// try the orders in which one action ends before the other, or in which they start or end at the
+/// same time.
 fn overlap_in_part(
     (start, end): (NodeId, NodeId),
     (other_start, other_end): (NodeId, NodeId),

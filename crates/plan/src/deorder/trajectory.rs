@@ -1,10 +1,10 @@
-//! Orders and bounds for constraints on the course of a plan.
+//! Orders and bounds for trajectory constraints.
 //!
 //! The facts that a constraint reads change at some happenings of the plan. These keep their order,
-//! and simultaneous ones stay together. So the constraint's conditions are true and false in the
-//! same turns in each schedule. `always`, `sometime`, `at-most-once`, `sometime-after`,
+//! and simultaneous ones stay together. So the constraint's conditions have the same truth values
+//! after each change, in every schedule. `always`, `sometime`, `at-most-once`, `sometime-after`,
 //! `sometime-before` and `at end` depend on nothing else. The other constraints bound the time of a
-//! turn, or the time between two turns. The result may be too strict, but is never too weak.
+//! change, or the time between two changes. The result may be too strict, but is never too weak.
 
 use std::collections::BTreeSet;
 
@@ -24,7 +24,7 @@ struct Phase {
     holds: [bool; 2],
 }
 
-/// Returns constraints between happenings that imply the constraints on the course of a valid plan.
+/// Returns constraints between happenings that imply the trajectory constraints of a valid plan.
 ///
 /// `footprints` and `times` are by node.
 pub(super) fn constraints(
@@ -115,7 +115,7 @@ fn effects(plan: &StnPlan, node: NodeId) -> &[Effect] {
     }
 }
 
-/// Keeps turns in their order, and simultaneous ones together.
+/// Keeps the changes in their order, and simultaneous ones together.
 fn constrain_order(
     task: &Task,
     groups: &[Vec<NodeId>],
@@ -210,7 +210,7 @@ fn is_true(condition: &Condition, facts: &BTreeSet<FactId>) -> bool {
     }
 }
 
-/// Bounds the times of turns. Returns `None` if the plan violates the constraint.
+/// Bounds the times of the changes. Returns `None` if the plan violates the constraint.
 fn bounds(modal: &Modal<Condition>, phases: &[Phase], found: &mut Vec<Constraint>) -> Option<()> {
     let zero = NodeId::ZERO;
     match modal {
@@ -237,7 +237,7 @@ fn bounds(modal: &Modal<Condition>, phases: &[Phase], found: &mut Vec<Constraint
         }
         Modal::HoldDuring(from, until, _) => throughout(phases, from, Some(until), found)?,
         Modal::HoldAfter(from, _) => throughout(phases, from, None, found)?,
-        // Only the order of turns counts.
+        // Only the order of the changes matters.
         Modal::AtEnd(_)
         | Modal::Always(_)
         | Modal::Sometime(_)

@@ -20,7 +20,7 @@ pub(super) enum Place {
     Conditions(FunctionId),
 }
 
-/// Returns the distinct constants there, in ascending order.
+/// Returns the distinct constants at this place of an action, in ascending order.
 pub(super) fn constants(task: &Task, action: &Action, place: Place) -> Vec<Rational> {
     let mut found = Vec::new();
     let _ = rewritten(task, action, place, &mut |leaf| {
@@ -34,7 +34,7 @@ pub(super) fn constants(task: &Task, action: &Action, place: Place) -> Vec<Ratio
     found
 }
 
-/// Returns the fluents that are read there.
+/// Returns the fluents that are read at this place of an action.
 pub(super) fn fluents(task: &Task, action: &Action, place: Place) -> Vec<FluentId> {
     let mut found = Vec::new();
     let _ = rewritten(task, action, place, &mut |leaf| {
@@ -48,7 +48,7 @@ pub(super) fn fluents(task: &Task, action: &Action, place: Place) -> Vec<FluentI
     found
 }
 
-/// Returns the action with the parameter in place of the constant there.
+/// Returns the action with the parameter in place of the constant at this place.
 pub(super) fn with_parameter(
     task: &Task,
     action: &Action,

@@ -1,4 +1,4 @@
-//! Constraints on the course of a plan, compiled into conditions of actions and goals.
+//! Trajectory constraints, compiled into conditions of actions and goals.
 //!
 //! A problem with constraints becomes one without constraints, whose plans satisfy them (Baier &
 //! `McIlraith`, ICAPS 2006, and Bonassi, De Giacomo, Favorito, Fuggitti, Gerevini & Scala, ICAPS

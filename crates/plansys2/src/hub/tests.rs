@@ -108,7 +108,7 @@ fn failed(why: &str) -> ActionUpdate {
 }
 
 #[test]
-fn a_conversation() {
+fn performer_reports_response_feedback_and_finish() {
     let mut scene = Fixture::new();
     scene.begin(7, "move r a b");
     scene.says(kind::RESPONSE, "robot1", "move r a b");
@@ -238,7 +238,7 @@ fn feedback_is_a_sign_of_life() {
 }
 
 #[test]
-fn a_performer_that_does_nothing_has_lost_a_word() {
+fn action_fails_if_its_performer_is_idle() {
     let mut scene = Fixture::new();
     scene.begin(1, "move r a b");
     scene.says(kind::RESPONSE, "robot1", "move r a b");

@@ -252,7 +252,7 @@ fn changes_during_read_are_kept() {
 }
 
 #[test]
-fn a_problem_expert_with_another_problem_is_left_alone() {
+fn problem_expert_with_another_problem_is_not_modified() {
     let mut expert = Expert::with(&["cooked rice"], &[]);
     let mut mirror = begun(&mut expert);
     mirror.set_beliefs(&[fact("(at r a)", false)], &[]);

@@ -27,7 +27,7 @@ const START: &str = r#"{"type":"start","ticket":3,"action":"(drive r a b)","dura
 const WAIT: &str = r#"{"type":"wait","until":{"exact":"4","decimal":4.0},"question":9}"#;
 
 #[test]
-fn a_start_is_a_command_once() {
+fn repeated_start_is_executed_once() {
     let mut world = greeted(1.0);
     let action = Action {
         ticket: 3,
@@ -40,7 +40,7 @@ fn a_start_is_a_command_once() {
 }
 
 #[test]
-fn time_begins_with_the_first_thing_to_do_and_runs_at_its_speed() {
+fn clock_starts_with_first_request_and_runs_at_set_speed() {
     let mut world = greeted(2.0);
     hears(&mut world, START, 10.0);
     world.report(3, &ActionUpdate::Started, at(10.5));
@@ -55,7 +55,7 @@ fn time_begins_with_the_first_thing_to_do_and_runs_at_its_speed() {
 }
 
 #[test]
-fn a_question_is_answered_when_its_time_has_come() {
+fn question_is_answered_at_its_time() {
     let mut world = greeted(1.0);
     hears(&mut world, WAIT, 1.0);
     assert!(world.answer(at(4.99)).is_empty());

@@ -1,6 +1,6 @@
 //! Integration tests of the bridge to `PlanSys2`.
 
 mod adversary;
+mod python_example;
 #[path = "../../../../testing/skipped.rs"]
 mod skipped;
-mod twin;

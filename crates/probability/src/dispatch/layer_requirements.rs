@@ -98,7 +98,7 @@ impl LayerRequirements {
         knows_all
     }
 
-    /// Updates one truth value. Returns `true` if any layer has a demand about the subject.
+    /// Updates one truth value. Returns `true` if any layer has a requirement on the subject.
     fn set(&mut self, subject: Subject, is: bool) -> bool {
         let demand = self.by_subject.get_mut(&subject);
         if let Some(demand) = demand {
@@ -208,7 +208,7 @@ mod tests {
     use super::{Counts, gaps};
 
     #[test]
-    fn the_last_zero_is_that_of_a_plain_list() {
+    fn last_zero_matches_plain_list() {
         let mut seed: u32 = 7;
         let mut draw = |below: usize| {
             seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -245,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn gaps_and_ranges_make_up_the_whole() {
+    fn gaps_are_complement_of_ranges() {
         assert_eq!(gaps(&[], 3), [(0, 3)]);
         assert_eq!(gaps(&[(0, 1), (2, 3)], 3), [(1, 2)]);
         assert_eq!(gaps(&[(1, 2)], 4), [(0, 1), (2, 4)]);

@@ -6,7 +6,7 @@ use elbowroom_model::ground::{Condition, Expression, FactId};
 use elbowroom_model::problem::Comparison;
 use elbowroom_num::Rational;
 
-/// A conjunction, split by what its parts read.
+/// A conjunction, split into the parts that read facts and those that read numbers.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Requirement {
     /// Facts with the required truth values, sorted.

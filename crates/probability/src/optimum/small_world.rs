@@ -457,7 +457,7 @@ mod tests {
     }
 
     #[test]
-    fn sets_are_counted() {
+    fn number_of_running_sets_matches_enumeration() {
         for actions in 0..10_u32 {
             let few = |set: &u32| set.count_ones() as usize <= MAX_RUNNING;
             let count = (0..1_u32 << actions).filter(few).count();

@@ -348,7 +348,7 @@ mod tests {
     use super::groups;
 
     #[test]
-    fn nodes_in_a_circle_are_one_group() {
+    fn nodes_of_a_cycle_form_one_component() {
         let needs = |nodes: &[usize]| nodes.iter().copied().map(NodeId::from).collect();
         let graph: Vec<BTreeSet<NodeId>> = vec![
             needs(&[1]),

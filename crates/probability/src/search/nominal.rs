@@ -220,7 +220,8 @@ impl Nominal {
     }
 }
 
-/// An undecided fact, or a number; the network handles these.
+/// The condition reads an undecided fact or a number, so it cannot be evaluated here; the network
+/// handles it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Open;
 

@@ -1,12 +1,12 @@
 //! `PGen`, compared with the enumeration of all orders.
 
+use crate::reference;
 use crate::shared;
-use crate::twin;
 use std::fmt::Write as _;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use crate::twin::random::{Case, Taste, case, failing_in_time, in_time, with_failing_ends};
+use crate::reference::random::{Case, Taste, case, failing_in_time, in_time, with_failing_ends};
 use elbowroom_model::Task;
 use elbowroom_model::ground::FactId;
 use elbowroom_plan::{InstanceId, Node, NodeId, PartialOrderPlan};
@@ -40,11 +40,11 @@ fn compare(case: &Case, semantics: Semantics, settings: SearchSettings) -> Compa
     let found = search
         .best_order(&case.circumstances, &mut never_interrupt)
         .unwrap();
-    let orders = twin::orders::all(case, semantics, &search);
-    let best = twin::orders::best(&orders, true);
+    let orders = reference::orders::all(case, semantics, &search);
+    let best = reference::orders::best(&orders, true);
     // Spontaneous changes, or failures of effects, may help happenings that come at one moment
     // although they do not need each other.
-    let apart = twin::orders::best(&orders, false).map_or(0.0, |(best, _)| best);
+    let apart = reference::orders::best(&orders, false).map_or(0.0, |(best, _)| best);
     let is_certain = case.likelihoods.defaults.effect == Some(1.0);
     let is_steady = is_certain
         && case.likelihoods.predicates.values().all(|flip| {
@@ -80,7 +80,7 @@ fn compare(case: &Case, semantics: Semantics, settings: SearchSettings) -> Compa
             network.push_all(order.into()).unwrap();
             assert!((network.success_probability().unwrap() - p).abs() < 1e-15);
             let joined = &order.joined;
-            let mut spelt_out = twin::Worlds::new(
+            let mut spelt_out = reference::Worlds::new(
                 &case.task,
                 &case.plan,
                 &case.likelihoods,

@@ -1,7 +1,9 @@
 //! The pruned network, compared with the enumeration of all worlds.
 
-use crate::twin::Worlds;
-use crate::twin::random::{Case, Taste, case, failing_in_time, in_time, order, with_failing_ends};
+use crate::reference::Worlds;
+use crate::reference::random::{
+    Case, Taste, case, failing_in_time, in_time, order, with_failing_ends,
+};
 use elbowroom_probability::{Model, PrunedNetwork, Semantics};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

@@ -3,7 +3,7 @@
 use crate::shared;
 use std::sync::Arc;
 
-use crate::twin::random::{Case, Taste, case, with_failing_ends, with_outcomes};
+use crate::reference::random::{Case, Taste, case, with_failing_ends, with_outcomes};
 use elbowroom_model::Task;
 use elbowroom_model::ground::{Action, Body, Change, Condition, SnapAction};
 use elbowroom_plan::{InstanceId, PartialOrderPlan};

@@ -7,8 +7,8 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::process::{Command, Stdio};
 
+use crate::reference::random::{Case, Taste, case, order};
 use crate::shared::skipped;
-use crate::twin::random::{Case, Taste, case, order};
 use elbowroom_model::ground::{Body, Condition, FactId};
 use elbowroom_plan::{Node, NodeId};
 use elbowroom_probability::{Model, PrunedNetwork, Semantics};

@@ -12,7 +12,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from . import _plots
-from ._numbers import Exact, exact, shown, shown_inwards
+from ._numbers import Exact, exact, format_inwards, format_number
 from ._tables import Table, html_table
 
 if TYPE_CHECKING:
@@ -83,11 +83,11 @@ class Plan(Table):
         return self._text
 
     def __repr__(self) -> str:
-        return f"<Plan: {len(self.steps)} steps, makespan {shown(self.makespan)}>"
+        return f"<Plan: {len(self.steps)} steps, makespan {format_number(self.makespan)}>"
 
     def _repr_html_(self) -> str:
-        rows = [(shown(s.start), s.action, shown(s.duration)) for s in self.steps]
-        caption = f"plan, makespan {shown(self.makespan)}"
+        rows = [(format_number(s.start), s.action, format_number(s.duration)) for s in self.steps]
+        caption = f"plan, makespan {format_number(self.makespan)}"
         return html_table(("start", "action", "duration"), rows, caption)
 
     def plot(self, envelope: Envelope | None = None, ax: Axes | None = None) -> Axes:
@@ -194,18 +194,19 @@ class Verdict(Table):
 
     def __repr__(self) -> str:
         if self.violation is None:
-            return f"<Verdict: valid, makespan {shown(self.makespan)}>"
+            return f"<Verdict: valid, makespan {format_number(self.makespan)}>"
         return f"<Verdict: invalid: {self.violation.message}>"
 
     def _repr_html_(self) -> str:
         if self.violation is not None:
-            row = (shown(self.violation.time), self.violation.action or "", self.violation.message)
+            violation = self.violation
+            row = (format_number(violation.time), violation.action or "", violation.message)
             return html_table(("time", "action", "what is wrong"), [row], "the plan does not work")
         rows = [
-            (shown(m.margin), m.condition, m.when, m.action or "", shown(m.time))
+            (format_number(m.margin), m.condition, m.when, m.action or "", format_number(m.time))
             for m in sorted(self.rows(), key=lambda m: m.margin)
         ]
-        caption = f"the plan works, makespan {shown(self.makespan)}"
+        caption = f"the plan works, makespan {format_number(self.makespan)}"
         return html_table(("margin", "condition", "when", "action", "time"), rows, caption)
 
 
@@ -267,13 +268,13 @@ class Stn(Table):
 
     def _repr_html_(self) -> str:
         def text(bound: Exact | str) -> str:
-            return bound if isinstance(bound, str) else shown(bound)
+            return bound if isinstance(bound, str) else format_number(bound)
 
         rows = [(text(c.lower), c.to, c.from_, text(c.upper), c.reason) for c in self.constraints]
         return html_table(("at least", "to", "from", "at most", "reason"), rows, "network")
 
 
-class Room(NamedTuple):
+class QuantityInterval(NamedTuple):
     """A quantity with its interval."""
 
     name: str
@@ -340,19 +341,20 @@ class Envelope(Table):
         found: dict[str, Any] | None = self.document.get("counterexample")
         return found
 
-    def rows(self) -> list[Room]:
+    def rows(self) -> list[QuantityInterval]:
         """Each quantity and its interval."""
         if self.answer not in ("envelope", "inside", "outside"):
             return []
-        fields = Room._fields
+        fields = QuantityInterval._fields
         return [
-            Room(*(it.get(field) for field in fields)) for it in self.document["parameters"]
+            QuantityInterval(*(it.get(field) for field in fields))
+            for it in self.document["parameters"]
         ]
 
     def _fields(self) -> Sequence[str]:
-        return Room._fields
+        return QuantityInterval._fields
 
-    def __getitem__(self, name: str) -> Room:
+    def __getitem__(self, name: str) -> QuantityInterval:
         for room in self.rows():
             if room.name == name or room.quantity == name:
                 return room
@@ -370,7 +372,7 @@ class Envelope(Table):
 
     def __repr__(self) -> str:
         rooms = ", ".join(
-            f"{r.name} in [{shown_inwards(r.lower, True)}, {shown_inwards(r.upper, False)}]"
+            f"{r.name} in [{format_inwards(r.lower, True)}, {format_inwards(r.upper, False)}]"
             for r in self.rows()
         )
         why = f": {self.why_not}" if self.why_not else ""
@@ -381,12 +383,12 @@ class Envelope(Table):
             (
                 room.name,
                 room.quantity,
-                shown(room.nominal),
-                shown_inwards(room.lower, True),
-                shown_inwards(room.upper, False),
+                format_number(room.nominal),
+                format_inwards(room.lower, True),
+                format_inwards(room.upper, False),
                 room.lower_limit or "",
                 room.upper_limit or ("nothing" if room.upper == math.inf else ""),
-                "" if room.timeout is None else shown(room.timeout),
+                "" if room.timeout is None else format_number(room.timeout),
             )
             for room in self.rows()
         ]
@@ -480,12 +482,15 @@ class Run(Table):
         return self.verdict == "goal-reached"
 
     def __repr__(self) -> str:
-        return f"<Run: {self.verdict} at {shown(self.time)}, {self.replans} new plans>"
+        return f"<Run: {self.verdict} at {format_number(self.time)}, {self.replans} new plans>"
 
     def _repr_html_(self) -> str:
-        rows = [(shown(e.start), e.action, shown(e.duration), e.outcome or "") for e in self.rows()]
+        rows = [
+            (format_number(e.start), e.action, format_number(e.duration), e.outcome or "")
+            for e in self.rows()
+        ]
         why = f" ({self.why})" if self.why else ""
-        caption = f"{self.verdict}{why} at {shown(self.time)}, {self.replans} new plans"
+        caption = f"{self.verdict}{why} at {format_number(self.time)}, {self.replans} new plans"
         return html_table(("start", "action", "took", "outcome"), rows, caption)
 
     def plot(self, ax: Axes | None = None) -> Axes:

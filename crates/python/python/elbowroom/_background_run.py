@@ -18,7 +18,7 @@ from ._errors import ExecutiveError, InterruptedWarning
 from ._lifecycle import POLL_INTERVAL, CtrlC, Lifecycle
 from ._numbers import document
 from ._runs import concluded, world_lifecycle
-from ._texts import seconds
+from ._texts import checked_time_limit
 from ._world import AsyncWorld
 
 ENDING_TIME = 2.0
@@ -120,7 +120,7 @@ class BackgroundRun:
             ExecutiveError: if the journal cannot be written.
         """
         self._refuse_in_world("join")
-        limit = seconds(timeout)
+        limit = checked_time_limit(timeout)
         if not self._over.wait(None if limit is None else min(limit, threading.TIMEOUT_MAX)):
             return None
         if self._failure is not None:

@@ -125,7 +125,7 @@ class ClockWarning(UserWarning):
 
 
 class ExecutiveWarning(UserWarning):
-    """Something about the journal or the clock of an executive that continues; see :attr:`Executive.warnings`."""
+    """A problem with the journal or the clock of an executive, which continues; see :attr:`Executive.warnings`."""
 
 
 class DamagedWarning(UserWarning):

@@ -16,7 +16,7 @@ from ._runs import RunRequest, run_options
 from ._stepped import SteppedWorld
 from ._stop import Stop
 from ._tables import ProgressCallback, listener
-from ._texts import AnyPlan, PlannerCallable, Text, asked
+from ._texts import AnyPlan, PlannerCallable, Text, native_planner
 from ._world import AsyncWorld, World
 
 
@@ -118,7 +118,7 @@ class Executable:
             self._native,
             None if plan is None else self._plan_text(plan),
             json.dumps(chosen),
-            asked(planner),
+            native_planner(planner),
             trace,
         )
         return Stepped(native)

@@ -20,7 +20,7 @@ from ._numbers import Number, document, text
 from ._problem import read
 from ._runs import description, run_options
 from ._stepped import SteppedWorld
-from ._texts import Text, named_text, seconds
+from ._texts import Text, checked_time_limit, named_text
 from ._world import Action, AsyncWorld, World
 
 ACCEPT_TIME = 2.0
@@ -311,7 +311,7 @@ class Executive(BackgroundRun):
             ExecutiveError: if the executive ends.
         """
         self._refuse_in_world("wait")
-        limit = seconds(timeout)
+        limit = checked_time_limit(timeout)
         deadline = None if limit is None else time.monotonic() + limit
         line = 0
         while True:

@@ -404,10 +404,10 @@ class Lifecycle:
 
 
 class CtrlC:
-    """Passes Ctrl-C to a lifecycle while it is entered, in the main thread.
+    """Context manager that passes Ctrl-C to a lifecycle, in the main thread.
 
-    With ``takes_over``, also if there is another handler, such as that of :func:`asyncio.run`. That one receives a
-    signal at the end if there was any.
+    With ``takes_over``, it also replaces another handler, such as that of :func:`asyncio.run`. The other handler
+    receives the signal at the end, if there was one.
     """
 
     def __init__(self, lifecycle: Lifecycle, takes_over: bool = False) -> None:

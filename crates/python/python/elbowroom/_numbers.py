@@ -68,11 +68,11 @@ def document(text: str) -> Any:
     return json.loads(text, object_hook=_pair)
 
 
-def shown(number: Exact | None, digits: int = 3) -> str:
+def format_number(number: Exact | None, digits: int = 3) -> str:
     """Formats a number for display, rounded to ``digits`` decimals.
 
     >>> from fractions import Fraction
-    >>> shown(Fraction(1, 3)), shown(Fraction(5, 2)), shown(float("inf"))
+    >>> format_number(Fraction(1, 3)), format_number(Fraction(5, 2)), format_number(float("inf"))
     ('0.333', '2.5', 'inf')
     """
     if number is None:
@@ -84,16 +84,16 @@ def shown(number: Exact | None, digits: int = 3) -> str:
     return f"{float(number):.{digits}f}".rstrip("0").rstrip(".")
 
 
-def shown_inwards(number: Exact, is_lower: bool, digits: int = 3) -> str:
+def format_inwards(number: Exact, is_lower: bool, digits: int = 3) -> str:
     """Formats an end of an interval, rounded into the interval, so that the guarantee covers the printed interval.
 
     >>> from fractions import Fraction
-    >>> shown_inwards(Fraction(2, 3), True), shown_inwards(Fraction(2, 3), False)
+    >>> format_inwards(Fraction(2, 3), True), format_inwards(Fraction(2, 3), False)
     ('0.667', '0.666')
     """
     if isinstance(number, float) or number.denominator == 1:
-        return shown(number)
+        return format_number(number)
     scale = 10**digits
     scaled = number * scale
     whole = math.ceil(scaled) if is_lower else math.floor(scaled)
-    return shown(Fraction(whole, scale), digits)
+    return format_number(Fraction(whole, scale), digits)

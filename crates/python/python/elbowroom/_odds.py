@@ -140,7 +140,7 @@ class Odds(Table):
 
     @property
     def happenings(self) -> list[Happening]:
-        """The order."""
+        """The happenings, in the order in which they are executed."""
         return [
             Happening(*(it.get(field) for field in Happening._fields))
             for it in self._order.get("happenings", [])
@@ -212,4 +212,4 @@ class Odds(Table):
         Raises:
             ImportError: if matplotlib is not installed.
         """
-        return _plots.falling(self, ax)
+        return _plots.success_lanes(self, ax)

@@ -90,7 +90,7 @@ def executed(run: Run, ax: Axes | None) -> Axes:
     return _lanes(ax, [row.action for row in rows], "time")
 
 
-def falling(odds: Odds, ax: Axes | None) -> Axes:
+def success_lanes(odds: Odds, ax: Axes | None) -> Axes:
     """Draws a lane for each happening: the probability that everything has succeeded so far."""
     happenings = odds.happenings
     ax = axes(ax, len(happenings) + 1)

@@ -16,7 +16,7 @@ from ._numbers import Number, document, text, timeout_text
 from ._odds import Odds
 from ._plans import Plans
 from ._tables import ProgressCallback, listener
-from ._texts import AnyPlan, Text, box, line, named_text, seconds, warn
+from ._texts import AnyPlan, Text, box, checked_time_limit, line, named_text, warn
 
 
 def read(domain: Text, problem: Text, *, epsilon: Number = "0.001") -> Problem:
@@ -176,7 +176,7 @@ class Problem(Executable):
         """
         if first is None:
             first = time_limit is None
-        limit = seconds(time_limit)
+        limit = checked_time_limit(time_limit)
         answer, is_interrupted = self._native.plan(
             planner, limit, first, memory, jobs, self_overlap, listener(progress)
         )
@@ -216,7 +216,8 @@ class Problem(Executable):
         >>> plans.answer.stop
         'exhausted'
         """
-        native = _native.Plans(self._native, seconds(time_limit), memory, jobs, self_overlap)
+        limit = checked_time_limit(time_limit)
+        native = _native.Plans(self._native, limit, memory, jobs, self_overlap)
         return Plans(native)
 
     def stn(self, plan: AnyPlan) -> Stn:
@@ -311,7 +312,7 @@ class Problem(Executable):
         if most_checks is not None:
             options["most_checks"] = most_checks
         answer, makespans, is_interrupted = self._native.envelope(
-            self._plan_text(plan), json.dumps(options), seconds(time_limit), listener(progress)
+            self._plan_text(plan), json.dumps(options), checked_time_limit(time_limit), listener(progress)
         )
         found = document(answer)
         warn(is_interrupted, found["answer"] != "none")
@@ -386,7 +387,7 @@ class Problem(Executable):
             named_text(likelihoods, "likelihoods"),
             None if world is None else named_text(world, "world"),
             json.dumps(options),
-            seconds(time_limit),
+            checked_time_limit(time_limit),
             listener(progress),
         )
         found = document(answer)

@@ -20,7 +20,7 @@ from ._lifecycle import GRACE, POLL_INTERVAL, STOP_TIME, Blocked, CtrlC, Lifecyc
 from ._numbers import document, text, timeout_text
 from ._stepped import SteppedAdapter, SteppedWorld
 from ._stop import Stop
-from ._texts import PlannerCallable, asked, named_text, seconds
+from ._texts import PlannerCallable, checked_time_limit, named_text, native_planner
 from ._world import AsyncWorld
 
 _TEXTS = (
@@ -144,8 +144,8 @@ class RunRequest:
     ) -> None:
         self._problem, self._plan, self._trace = problem, plan, trace
         self._chosen = run_options(executor, planner, seed, options)
-        self._limit = seconds(wall_time_limit)
-        self._planner, self._progress, self._handle = asked(planner), progress, stop
+        self._limit = checked_time_limit(wall_time_limit)
+        self._planner, self._progress, self._handle = native_planner(planner), progress, stop
         self._stop = _native.Stop()
         self._lifecycle: Lifecycle | None = None
         if isinstance(world, (str, os.PathLike)):

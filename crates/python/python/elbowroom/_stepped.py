@@ -112,7 +112,7 @@ class SteppedWorld:
 
 
 class SteppedAdapter(World):
-    """Adapter of a stepped world to one that waits. A wait ends when ``is_to_end`` becomes true."""
+    """Adapter of a stepped world to one that waits. A wait ends when ``is_to_end`` returns true."""
 
     def __init__(self, world: SteppedWorld, is_to_end: Callable[[], bool]) -> None:
         self._world = world

@@ -37,7 +37,7 @@ def named_text(given: Text, what: str) -> tuple[str, str]:
         return path, file.read()
 
 
-def asked(planner: str | PlannerCallable) -> Callable[[str, str], str | None] | None:
+def native_planner(planner: str | PlannerCallable) -> Callable[[str, str], str | None] | None:
     """Returns the planner for the native module, if the planner is in Python."""
     if isinstance(planner, str):
         return None
@@ -68,7 +68,7 @@ def box(contains: str | dict[str, tuple[Number, Number]] | None) -> str | None:
     return " ".join(f"{name}=[{lower},{upper}]" for name, (lower, upper) in ends.items())
 
 
-def seconds(limit: float | None) -> float | None:
+def checked_time_limit(limit: float | None) -> float | None:
     """Checks a time limit."""
     if limit is None:
         return None

@@ -59,7 +59,7 @@ class TimedEffects:
         return [abs(action.time - it) for action in self.actions for it in times if it != action.time]
 
     def _are_assignments(self, effects: list[Any]) -> bool:
-        """Returns ``True`` if they assign constants, each to a different fluent."""
+        """Returns ``True`` if the effects assign constants, each to a different fluent."""
         targets = {effect.fluent for effect in effects}
         return len(targets) == len(effects) and all(
             effect.is_assignment()
@@ -72,13 +72,13 @@ class TimedEffects:
     # PDDL.
 
     def predicates(self) -> Iterator[str]:
-        """The facts of the actions."""
+        """Yields the declarations of the facts that the actions read and write."""
         for action in self.actions:
             yield self._possible(action)
             yield self._done(action)
 
     def domain(self) -> Iterator[str]:
-        """The actions."""
+        """Yields the declarations of the actions."""
         for action in self.actions:
             possible = self._possible(action)
             conditions = " ".join(self._bounds.before(action.effects))
@@ -112,7 +112,7 @@ class TimedEffects:
     # Plans.
 
     def name_of(self, action: TimedAction) -> str:
-        """Returns its name in PDDL."""
+        """Returns the PDDL name of an action."""
         return self._say.name("timed", f"effects at {action.time}")
 
     def times(self) -> dict[str, Fraction]:

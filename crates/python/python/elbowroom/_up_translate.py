@@ -1,7 +1,7 @@
 """Exact translation of unified-planning's problems to PDDL, and of plans back.
 
 Numbers are written as fractions; nothing is rounded. Names become valid and unique PDDL names.
-Features without a counterpart are rejected by name.
+Features without a counterpart are rejected; the message names them.
 """
 
 from __future__ import annotations
@@ -293,13 +293,13 @@ class Translation:
         return self.problem.check(steps, tolerance=0, rules=self.rules)
 
     def name_of(self, instance: ActionInstance) -> str:
-        """Converts an action of the original problem to one of the translation."""
+        """Returns an action of the original problem in the notation of the translation: ``(drive r a b)``."""
         words = [self._say.name("action", instance.action)]
         words += [self._say.walk(it) for it in instance.actual_parameters]
         return f"({' '.join(words)})"
 
     def instance(self, action: str) -> ActionInstance:
-        """Converts an action of the translation to one of the original problem."""
+        """Converts an action in the notation of the translation to one of the original problem."""
         name, *arguments = action.strip("()").split()
         manager = self.original.environment.expression_manager
         objects = [manager.ObjectExp(self.objects[it]) for it in arguments]

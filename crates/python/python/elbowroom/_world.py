@@ -138,7 +138,7 @@ class World:
         return None
 
     def stop(self) -> None:
-        """Stops all activity. Called once at the end of each run, for any reason of the end."""
+        """Stops all activity. Called once at the end of each run, whatever the reason for its end."""
 
 
 class AsyncWorld:

@@ -32,7 +32,7 @@ pub struct SnapshotLine {
     /// Time since which the run has been idle, if it is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub since: Option<Exact>,
-    /// `true` if the run is idle because no plan reaches the open goals from there.
+    /// `true` if the run is idle because no plan reaches the open goals from this state.
     #[serde(default, skip_serializing_if = "is_false")]
     pub unsolvable: bool,
     /// Number of started actions.

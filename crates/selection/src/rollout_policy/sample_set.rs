@@ -120,7 +120,7 @@ impl SampleSet {
         let seed = self.seed.wrapping_add(sample << 32);
         let world = &who.rollouts.world;
         let report = run.run_to_end(
-            &mut *world.world_amid(&self.belief, seed, &self.seen),
+            &mut *world.world_in_mid_execution(&self.belief, seed, &self.seen),
             &mut workers,
         );
         report.verdict == Verdict::GoalReached

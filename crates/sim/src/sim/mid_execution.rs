@@ -184,7 +184,7 @@ impl<'a> SimWorld<'a> {
         happens.then(|| time.max(Rational::ZERO))
     }
 
-    /// Returns the number of draws close to that time.
+    /// Returns the number of draws that are close to `time`.
     fn draws_near(&self, index: usize, event: &ExogenousEvent, time: &Rational) -> u64 {
         let drawn = (0..MAX_DRAWS).filter_map(|draw| self.draw_event_time(index, event, draw));
         let drawn: Vec<f64> = drawn.map(|time| time.to_f64()).collect();

@@ -1,8 +1,8 @@
 //! Integration tests of simulated worlds.
 
-mod amid;
 mod failures;
 mod hazards;
-mod one_time;
+mod mid_execution;
 mod outcomes;
+mod simultaneous_events;
 mod world_files;

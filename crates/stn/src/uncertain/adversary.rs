@@ -14,7 +14,7 @@ const PARTS_PER_UNIT: i128 = 1 << 40;
 ///
 /// If a network is not dynamically controllable, no executor can guarantee success. After any
 /// prefix of an execution, the executor can be made to fail either by ending a link now or by
-/// continuing it. The spoiler decides between the two each time that something has happened or
+/// continuing it. The adversary decides between the two each time that something has happened or
 /// could happen. It does not know the executor's next decisions.
 #[derive(Clone, Debug)]
 pub struct Adversary {
@@ -23,7 +23,7 @@ pub struct Adversary {
 }
 
 impl Adversary {
-    /// Creates a spoiler for a network whose times are relative to `origin`.
+    /// Creates an adversary for a network whose times are relative to `origin`.
     pub fn new(network: UncertainNetwork, origin: NodeId) -> Self {
         Self { network, origin }
     }

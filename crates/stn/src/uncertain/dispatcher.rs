@@ -62,7 +62,8 @@ pub struct Missed<W = Rational> {
     pub limit: W,
     /// Amount of the violation; positive.
     pub amount: W,
-    /// Path that implies that end, from the event that it is relative to.
+    /// Path of constraints that implies the limit. It begins at the event to which the limit is
+    /// relative.
     pub implying_path: Vec<Step<W>>,
     /// `true` if the time violates only the bounds of the link that ends at the node, and no other
     /// constraint. The remaining network may then still be executable: see [`Dispatcher::stays_executable`].

@@ -66,9 +66,9 @@ pub struct Refutation {
 pub enum Refuted {
     /// The network is dynamically controllable.
     No,
-    /// It is not, and each of these is a proof.
+    /// The network is not dynamically controllable, and each of these is a proof.
     Refutations(Vec<Refutation>),
-    /// It is not, but all proofs found are too long.
+    /// The network is not dynamically controllable, but all proofs found are too long.
     TooLong,
 }
 

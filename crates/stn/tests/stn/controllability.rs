@@ -74,7 +74,7 @@ fn a_conflict_is_a_negative_cycle_of_the_network() {
 }
 
 #[test]
-fn strong_implies_dynamic_and_its_times_satisfy_everything_at_the_corners() {
+fn strong_controllability_implies_dynamic_and_its_times_hold_at_all_corners() {
     let mut both = [0; 2];
     for seed in 0..many(5_000) {
         let board = Board::random(&mut Random(seed));

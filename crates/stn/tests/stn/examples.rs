@@ -95,7 +95,7 @@ fn oldest_of_equal_constraints_is_kept() {
 }
 
 #[test]
-fn a_precedence_by_way_of_a_third_node_is_implied() {
+fn precedence_through_third_node_is_implied() {
     let mut network = Network::with_nodes(3);
     network.add(Constraint::at_least(A, C, number(2)));
     network.add(Constraint::at_least(A, B, number(1)));

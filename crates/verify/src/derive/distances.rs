@@ -77,7 +77,8 @@ impl Distances {
         Ok(own.is_some_and(|own| own >= *least))
     }
 
-    /// Returns by how much `later` comes after `earlier` at least in every schedule, or `None` without limit.
+    /// Returns the least difference of `later` and `earlier` in all schedules, or `None` if it has
+    /// no lower limit.
     ///
     /// # Errors
     /// When the network has no schedule.

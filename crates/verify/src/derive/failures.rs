@@ -12,7 +12,8 @@ use super::offset_components::OffsetComponents;
 use super::point_state::{PointState, compared};
 use super::subject::{PointKind, Subject};
 
-/// The limit on the sets of points that can come before a moment inside an action.
+/// Limit on the number of considered sets: of points that can come before a moment inside an
+/// action.
 const MAX_SETS: usize = 4096;
 
 /// Possible violation of a condition: all inequalities hold.

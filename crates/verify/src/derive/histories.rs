@@ -133,12 +133,12 @@ impl<'a> Histories<'a> {
                     return Ok(());
                 };
                 let arrival = self.changes(point, step, &body.end.effects)?;
-                let turns = self.turns(point, arrival)?;
+                let changes = self.fluent_changes(point, arrival)?;
                 for (index, effect) in body.continuous.iter().enumerate() {
-                    let turn = (point, FluentChange::Ends((step, index)));
-                    self.fluents.entry(effect.fluent).or_default().push(turn);
+                    let change = (point, FluentChange::Ends((step, index)));
+                    self.fluents.entry(effect.fluent).or_default().push(change);
                 }
-                self.record(point, turns);
+                self.record(point, changes);
                 Ok(())
             }
         }
@@ -156,14 +156,17 @@ impl<'a> Histories<'a> {
     }
 
     fn apply(&mut self, point: usize, changes: Vec<&Change>) -> Result<(), NotDerived> {
-        let turns = self.turns(point, changes)?;
-        self.record(point, turns);
+        let changes = self.fluent_changes(point, changes)?;
+        self.record(point, changes);
         Ok(())
     }
 
-    fn record(&mut self, point: usize, turns: Vec<(FluentId, FluentChange)>) {
-        for (fluent, turn) in turns {
-            self.fluents.entry(fluent).or_default().push((point, turn));
+    fn record(&mut self, point: usize, changes: Vec<(FluentId, FluentChange)>) {
+        for (fluent, change) in changes {
+            self.fluents
+                .entry(fluent)
+                .or_default()
+                .push((point, change));
         }
     }
 
@@ -211,13 +214,13 @@ impl<'a> Histories<'a> {
     }
 
     /// Records the facts of changes, and returns those of fluents.
-    fn turns(
+    fn fluent_changes(
         &mut self,
         point: usize,
         changes: Vec<&Change>,
     ) -> Result<Vec<(FluentId, FluentChange)>, NotDerived> {
         let mut facts: BTreeMap<FactId, bool> = BTreeMap::new();
-        let mut turns = Vec::new();
+        let mut updates = Vec::new();
         let mut operators: BTreeMap<FluentId, bool> = BTreeMap::new();
         for change in changes {
             match change {
@@ -242,17 +245,20 @@ impl<'a> Histories<'a> {
                         );
                         return Err(NotDerived::Unknown(what));
                     }
-                    turns.push((*fluent, self.turn(point, *operator, *fluent, value)?));
+                    updates.push((
+                        *fluent,
+                        self.fluent_change(point, *operator, *fluent, value)?,
+                    ));
                 }
             }
         }
         for (fact, truth) in facts {
             self.facts.entry(fact).or_default().push((point, truth));
         }
-        Ok(turns)
+        Ok(updates)
     }
 
-    fn turn(
+    fn fluent_change(
         &self,
         point: usize,
         operator: UpdateOperator,
@@ -325,8 +331,8 @@ impl<'a> Histories<'a> {
                 }
                 rate = Value::Unknown;
             }
-            let turn = (point, FluentChange::Starts((step, index), rate));
-            self.fluents.entry(effect.fluent).or_default().push(turn);
+            let change = (point, FluentChange::Starts((step, index), rate));
+            self.fluents.entry(effect.fluent).or_default().push(change);
         }
         Ok(())
     }
@@ -389,14 +395,15 @@ impl<'a> Histories<'a> {
         }
     }
 
-    /// Returns `true` if the fluent has a number at first, or no value, and is only assigned numbers.
+    /// Returns `true` if the fluent's initial value is a number or missing, and all its changes are
+    /// assignments of numbers.
     pub(super) fn has_steps_alone(&self, fluent: FluentId) -> bool {
-        let turns = self.fluents.get(&fluent);
+        let changes = self.fluents.get(&fluent);
         let is_initially_open = self.subject.initials.contains_key(&fluent);
         !is_initially_open
-            && turns.is_none_or(|turns| {
-                turns.iter().all(|(_, turn)| {
-                matches!(turn, FluentChange::Set(Value::Known(value)) if value.as_number().is_some())
+            && changes.is_none_or(|changes| {
+                changes.iter().all(|(_, change)| {
+                matches!(change, FluentChange::Set(Value::Known(value)) if value.as_number().is_some())
             })
             })
     }

@@ -323,7 +323,7 @@ impl Numbers<'_> {
                 if !expression.times.is_empty() || expression.parameters.is_empty() {
                     continue;
                 }
-                // Where these two are in this order, all others are.
+                // Wherever these two are in this order, the other pairs must be in this order too.
                 let mut distances = Distances::new(self.certificate, &self.corner(&expression))?;
                 let mut are_others = true;
                 for &first in &earliest {

@@ -29,7 +29,7 @@ impl PointState<'_> {
     /// Returns `true` if the condition holds in all schedules.
     ///
     /// # Errors
-    /// When that is not the same in all schedules, or not known.
+    /// When the truth value differs between schedules, or is unknown.
     pub(super) fn holds(&self, condition: &Condition) -> Result<bool, Undetermined> {
         holds(condition, self)
     }
@@ -103,14 +103,14 @@ impl PointState<'_> {
         };
         let mut rates: BTreeMap<ContinuousId, &Value> = BTreeMap::new();
         let mut since = Linear::default();
-        for (point, turn) in fluents.get(&fluent).map_or(&[][..], Vec::as_slice) {
+        for (point, change) in fluents.get(&fluent).map_or(&[][..], Vec::as_slice) {
             if !(self.has_happened)(*point) {
                 continue;
             }
             let time = places.time(*point);
             value = advanced(value, &rates, &time.minus(&since));
             since = time;
-            match turn {
+            match change {
                 FluentChange::Set(amount) => value = amount.clone(),
                 FluentChange::Shift(amount) => value = sum(&value, amount),
                 FluentChange::Starts(id, rate) => {

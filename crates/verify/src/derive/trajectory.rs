@@ -1,11 +1,13 @@
-//! Constraints on the course of the plan, as orders and bounds on differences of times:
+//! Trajectory constraints, as orders and bounds on differences of times:
 //! [`TrajectoryDerivation`].
 //!
-//! The facts that a constraint reads change at some points. These *turns* keep their order in all schedules, and
-//! those at one time stay together. So the constraint's conditions are true and false in the same phases in each
-//! schedule. `always`, `sometime`, `at-most-once`, `sometime-after`, `sometime-before` and `at end` depend on nothing
-//! else. The others need bounds on the times at which phases begin: the state of a phase counts from the moment of
-//! its turn to before the next one (`elbowroom_model::Modal`). The validator has checked the constraints in the plan itself.
+//! The facts that a constraint reads change at some points. These changes keep their order in all
+//! schedules, and simultaneous ones stay simultaneous. So the constraint's conditions are true and
+//! false in the same phases in each schedule. `always`, `sometime`, `at-most-once`,
+//! `sometime-after`, `sometime-before` and `at end` depend on nothing else. The others need bounds
+//! on the times at which phases begin: the state of a phase counts from the time of its change
+//! until just before the next change (`elbowroom_model::Modal`). The validator has checked the
+//! constraints in the plan itself.
 
 use std::collections::BTreeSet;
 
@@ -18,7 +20,8 @@ use super::distances::Distances;
 use super::subject::{PointKind, Subject};
 use crate::certificate::{Constraint, Limit};
 
-/// `least <= time of to - time of from <= most`, which the plan needs because of a constraint on its course.
+/// `least <= time of to - time of from <= most`, which the plan needs because of a trajectory
+/// constraint..
 struct Bound {
     from: usize,
     to: usize,
@@ -26,12 +29,12 @@ struct Bound {
     most: Option<Rational>,
 }
 
-/// The bounds that keep the constraints on the course of the plan.
+/// The bounds that keep the trajectory constraints.
 pub(super) struct TrajectoryDerivation(Vec<Bound>);
 
 /// Part of the plan during which the conditions of a constraint keep their truth values.
 struct Phase {
-    /// The points of its turn; time zero for the initial state.
+    /// The points of the change that begins the phase; time zero for the initial state.
     change: Vec<usize>,
     /// The truth of the conditions; of the second, false if there is only one.
     holds: [bool; 2],
@@ -106,7 +109,7 @@ impl TrajectoryDerivation {
         !constraint.observed && self.0.iter().any(keeps)
     }
 
-    /// Keeps turns in their order, and the points of each together.
+    /// Keeps the changes in their order, and the points of each change together.
     fn check_order(&mut self, subject: &Subject<'_>, phases: &[Phase]) {
         let zero = || Some(Rational::ZERO);
         for (index, phase) in phases.iter().enumerate().skip(1) {
@@ -184,7 +187,8 @@ impl TrajectoryDerivation {
     }
 }
 
-/// Returns the phases of a constraint in the plan, one for each turn, after that of the initial state.
+/// Returns the phases of a constraint in the plan: that of the initial state, then one for each
+/// change.
 fn phases(subject: &Subject<'_>, modal: &Modal<Condition>) -> Result<Vec<Phase>, NotDerived> {
     let task = subject.task;
     let unknown = |what: &str| {
@@ -205,7 +209,7 @@ fn phases(subject: &Subject<'_>, modal: &Modal<Condition>) -> Result<Vec<Phase>,
         }
         read.extend(footprint.reads);
     }
-    let mut turns: Vec<usize> = Vec::new();
+    let mut changes: Vec<usize> = Vec::new();
     for (index, point) in subject.points.iter().enumerate().skip(1) {
         let footprint = &point.footprint;
         let mut written = footprint.adds.iter().chain(&footprint.deletes);
@@ -213,11 +217,11 @@ fn phases(subject: &Subject<'_>, modal: &Modal<Condition>) -> Result<Vec<Phase>,
             if !matches!(point.kind, PointKind::Timed(_)) && subject.has_guards(index) {
                 return Err(unknown("facts that conditional effects change"));
             }
-            turns.push(index);
+            changes.push(index);
         }
     }
     let time = |point: usize| &subject.points[point].time;
-    turns.sort_by_key(|&point| time(point));
+    changes.sort_by_key(|&point| time(point));
     let mut facts: BTreeSet<FactId> = task.initial().facts.iter().copied().collect();
     let truth = |facts: &BTreeSet<FactId>| {
         let mut holds = [false; 2];
@@ -230,17 +234,17 @@ fn phases(subject: &Subject<'_>, modal: &Modal<Condition>) -> Result<Vec<Phase>,
         change: vec![0],
         holds: truth(&facts),
     }];
-    for turn in turns.chunk_by(|one, other| time(*one) == time(*other)) {
-        for &point in turn {
+    for change in changes.chunk_by(|one, other| time(*one) == time(*other)) {
+        for &point in change {
             for fact in &subject.points[point].footprint.deletes {
                 facts.remove(fact);
             }
         }
-        for &point in turn {
+        for &point in change {
             facts.extend(&subject.points[point].footprint.adds);
         }
         phases.push(Phase {
-            change: turn.to_vec(),
+            change: change.to_vec(),
             holds: truth(&facts),
         });
     }

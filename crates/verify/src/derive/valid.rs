@@ -12,7 +12,8 @@ use super::numbers::Numbers;
 use super::subject::{PointKind, Subject, is_condition_of_state};
 use super::{NotDerived, failures};
 
-/// Failures of conditions that no schedule has for values in the box.
+/// Possible failures of conditions for which it was derived that no schedule with values in the box
+/// has them.
 pub(super) struct Refuted {
     /// Those of over-all conditions on numbers that vary.
     pub(super) conditions: Vec<Failure>,

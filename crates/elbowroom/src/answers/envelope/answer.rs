@@ -101,7 +101,7 @@ pub enum EnvelopeFinding {
         /// The objective of the box, if the largest one was requested.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         best: Option<Best>,
-        /// Counts of the plan's conditions, by what enforces them.
+        /// Counts of the plan's conditions, by the mechanism that enforces them.
         #[serde(default)]
         conditions: Conditions,
         /// The gain of knowing values in advance, if there is any.
@@ -269,7 +269,7 @@ pub enum Stop {
 pub struct WideningStep {
     /// Time since the start of the search, in seconds.
     pub seconds: f64,
-    /// Number of box checks before it.
+    /// Number of box checks before this widening.
     pub checks: usize,
     /// The name of the parameter whose interval has grown.
     pub parameter: String,

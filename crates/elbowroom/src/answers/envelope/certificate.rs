@@ -346,7 +346,7 @@ impl Cuts {
 fn proof_of(subject: &Subject<'_>, cut: &Cut) -> Proof {
     match &cut.ground {
         Ground::Cycle(origins) => Proof::Cycle(origins.iter().map(bound).collect()),
-        // Which durations count at their ends follows from the bounds.
+        // The bounds determine the durations that count at their ends.
         Ground::Fixed(parts) => Proof::Fixed(
             parts
                 .iter()

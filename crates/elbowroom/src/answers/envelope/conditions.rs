@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// The number of conditions of a plan, by what enforces them inside the envelope.
+/// The number of conditions of a plan, by the mechanism that enforces them inside the envelope.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Conditions {
     /// Bounds on the difference of two times: the plan's network implies them.

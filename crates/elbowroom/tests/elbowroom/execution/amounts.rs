@@ -17,7 +17,7 @@ use elbowroom::sim::SimWorld;
 
 use crate::execution::guarantee::one_order;
 use crate::execution::scene::{Scene, runs};
-use crate::promise::own;
+use crate::promise::handmade_plans;
 
 /// Independent surveys without deadlines, which only consume charge.
 const DOMAIN: &str = "(define (domain sites)
@@ -476,9 +476,11 @@ fn values_inside_the_envelope_cause_no_query() {
         "lamp",
     ];
     let cases = names.map(|name| (name, open(Scene::case(name))));
-    let own = own::OWN.iter().map(|[name, domain, problem, plan]| {
-        (*name, open(Scene::new(domain, problem, Some(plan))))
-    });
+    let own = handmade_plans::OWN
+        .iter()
+        .map(|[name, domain, problem, plan]| {
+            (*name, open(Scene::new(domain, problem, Some(plan))))
+        });
     let batteries = [
         ("small battery", one_order("160", "151")),
         ("large battery", one_order("180", "171")),

@@ -73,7 +73,7 @@ fn assert_limit(scene: &Scene, limit: Option<&Rational>) {
 }
 
 #[test]
-fn effect_at_start_pays_for_the_planned_duration() {
+fn effect_at_start_uses_the_planned_duration() {
     // The level of the tank grows with the real duration.
     let effects = "(at start (increase (paid) (* 2 ?duration))) (increase (tank) (* #t 2))";
     let scene = scene("(and)", effects, "(>= (paid) (tank))");

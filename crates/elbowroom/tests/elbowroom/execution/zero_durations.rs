@@ -39,14 +39,14 @@ fn assert_works(scene: &Scene) {
 }
 
 #[test]
-fn over_all_condition_of_no_time_is_vacuous() {
+fn over_all_condition_of_zero_duration_is_vacuous() {
     let action = "(:durative-action a :parameters () :duration (= ?duration 0)
         :condition (over all (p)) :effect (at end (p)))";
     assert_works(&scene(action, "", "(p)", "0: (a) [0]"));
 }
 
 #[test]
-fn action_of_no_time_works_between_others() {
+fn zero_duration_action_works_between_others() {
     let actions = "(:durative-action a :parameters () :duration (= ?duration 2)
         :condition (at start (p)) :effect (at end (q)))
       (:durative-action b :parameters () :duration (= ?duration 0)
@@ -56,7 +56,7 @@ fn action_of_no_time_works_between_others() {
 }
 
 #[test]
-fn planner_chosen_duration_of_no_time_works() {
+fn zero_duration_chosen_by_planner_works() {
     let action = "(:durative-action a :parameters ()
         :duration (and (>= ?duration 0) (<= ?duration 5))
         :condition (over all (p)) :effect (at end (q)))";

@@ -8,8 +8,8 @@ use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_pddl::{Source, read_plan, read_problem};
 
 mod battery;
-mod calm;
 mod cases;
+mod coinciding_ends;
 mod deadline;
 mod handover;
 mod instant;
@@ -73,7 +73,7 @@ pub(crate) fn kinds() -> Vec<Kind> {
         van::END_IN_A_WINDOW,
         kiln::END_AFTER_AN_END_BEFORE_A_DEADLINE,
         handover::END_WITHIN_ANOTHER,
-        calm::ENDS_THAT_COINCIDE_WITHOUT_NEED,
+        coinciding_ends::ENDS_THAT_COINCIDE_WITHOUT_NEED,
         lamps::ONE_FACT_TAKES_OVER,
         light::ENDS_AT_THE_SAME_INSTANT,
         power::CONDITION_FROM_AN_ACTION_THAT_STARTS_TOGETHER,

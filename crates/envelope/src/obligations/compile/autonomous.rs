@@ -1,14 +1,14 @@
 //! Processes and events: the symbolic run between two happenings of the plan.
 //!
-//! Let the order of the plan's happenings and of nature's turns (events, and processes that start
-//! and stop) be fixed. Then the time of each turn is a linear expression in the times before it,
-//! because a number that changes at a constant rate reaches its threshold after a linear delay. The
-//! run follows the course that nature takes at the nominal values, and requires the same course in
-//! every schedule: in each part between two turns, no event's condition becomes true, and processes
-//! stay active or inactive. All numbers are linear in time within a part, so conditions throughout
-//! it are decided at its two ends.
+//! The *transitions* are the events, and the starts and stops of processes. Let the order of the
+//! plan's happenings and of the transitions be fixed. Then the time of each transition is a linear
+//! expression in the times before it, because a number that changes at a constant rate reaches its
+//! threshold after a linear delay. The run follows the transitions at the nominal values, and
+//! requires the same sequence in every schedule: in each part between two transitions, no event's
+//! condition becomes true, and processes stay active or inactive. All numbers are linear in time
+//! within a part, so conditions throughout it are decided at its two ends.
 //!
-//! The requirement is sufficient, but not necessary: a plan may also work with another course.
+//! The requirement is sufficient, but not necessary: a plan may also work with another sequence.
 
 mod condition;
 mod phase;
@@ -72,7 +72,7 @@ impl AutonomousModel {
                     always.push(condition.clone());
                 }
                 _ => {
-                    return Err(Refusal::Nature {
+                    return Err(Refusal::Autonomous {
                         place: task.describe_modal(constraint),
                         obstacle: "together with processes and events, `always` is the only \
                                    supported trajectory constraint"
@@ -85,7 +85,7 @@ impl AutonomousModel {
         let footprints: Vec<_> = events
             .map(|event| Footprint::of_snap(task, &event.snap))
             .collect();
-        let mut nature = Self {
+        let mut model = Self {
             footprints,
             state_constraints: always,
             facts: BTreeSet::new(),
@@ -99,19 +99,19 @@ impl AutonomousModel {
             .flat_map(|event| &event.snap.effects)
         {
             match &effect.change {
-                Change::Add(fact) | Change::Delete(fact) => nature.facts.insert(*fact),
-                Change::Update { fluent, .. } => nature.fluents.insert(*fluent),
+                Change::Add(fact) | Change::Delete(fact) => model.facts.insert(*fact),
+                Change::Update { fluent, .. } => model.fluents.insert(*fluent),
             };
         }
         let processes = autonomous.processes.iter();
         let effects = processes.flat_map(|process| &process.effects);
-        nature.fluents.extend(effects.map(|effect| effect.fluent));
-        nature.refuse_changing_rates(task, plan)?;
-        Ok(Some(nature))
+        model.fluents.extend(effects.map(|effect| effect.fluent));
+        model.refuse_changing_rates(task, plan)?;
+        Ok(Some(model))
     }
 
-    /// Refuses rates of actions that nature changes, because they are read at the start of the
-    /// action.
+    /// Refuses rates of actions that processes or events change, because they are read at the start
+    /// of the action.
     fn refuse_changing_rates(&self, task: &Task, plan: &ParametrizedPlan) -> Result<(), Refusal> {
         for instance in &plan.plan.instances {
             let Some(body) = instance.action.durative() else {
@@ -145,17 +145,17 @@ impl AutonomousModel {
 }
 
 impl Compiler<'_> {
-    /// Runs nature from a happening to the next one.
+    /// Runs processes and events from a happening to the next one.
     pub(super) fn advance(
         &self,
-        nature: &AutonomousModel,
+        autonomous: &AutonomousModel,
         run: &mut Run,
         obligations: &mut Obligations,
     ) -> Result<(), Refusal> {
         let node = self.order[run.position];
         let next = self.order.get(run.position + 1).copied();
-        self.separate_from_events(nature, run, node, obligations);
-        let mut course = Phase::starting_after((self, nature), run, (node, next), obligations);
+        self.separate_from_events(autonomous, run, node, obligations);
+        let mut course = Phase::starting_after((self, autonomous), run, (node, next), obligations);
         if node == NodeId::ZERO {
             // The initial state must be stable as well.
             course.require_final_conditions()?;
@@ -181,7 +181,7 @@ impl Compiler<'_> {
     /// interferes with.
     fn separate_from_events(
         &self,
-        nature: &AutonomousModel,
+        autonomous: &AutonomousModel,
         run: &Run,
         node: NodeId,
         obligations: &mut Obligations,
@@ -194,7 +194,7 @@ impl Compiler<'_> {
         }
         let own = self.plan.plan.footprint(self.task, node);
         for Occurrence { event, after, at } in &run.occurred {
-            if !nature.footprints[*event].interferes_with(&own) {
+            if !autonomous.footprints[*event].interferes_with(&own) {
                 continue;
             }
             // Violated if the distance minus ε is negative.
@@ -202,7 +202,7 @@ impl Compiler<'_> {
             distance.constant -= self.task.epsilon();
             let name = &self.task.autonomous().events[*event].name;
             let words = self.plan.plan.describe_node(self.task, node);
-            let requirement = Requirement::Nature {
+            let requirement = Requirement::Autonomous {
                 after: *after,
                 course: format!("the event {name} must come before {words}, by at least ε"),
             };
@@ -220,9 +220,9 @@ impl Compiler<'_> {
     }
 
     /// Returns the error for conditional effects with open outcomes, which are not supported
-    /// together with nature.
+    /// together with processes and events.
     pub(super) fn guard_depends(&self, node: NodeId) -> Refusal {
-        Refusal::Nature {
+        Refusal::Autonomous {
             place: self.plan.plan.describe_node(self.task, node),
             obstacle: "a conditional effect, on which processes and events depend, may or may not \
                        occur, depending on times or parameters"
@@ -257,7 +257,7 @@ fn add_autonomous_obligation(
     }
     // Numbers often do not change, so that the same requirement occurs again.
     let is_known = |known: &Obligation| {
-        matches!(known.requirement, Requirement::Nature { .. }) && known.bad_cases == bad_cases
+        matches!(known.requirement, Requirement::Autonomous { .. }) && known.bad_cases == bad_cases
     };
     if !bad_cases.is_empty() && !obligations.direct.iter().any(is_known) {
         obligations.direct.push(Obligation {

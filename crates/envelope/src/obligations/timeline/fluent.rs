@@ -32,7 +32,7 @@ pub(super) struct FluentState {
 #[derive(Clone, Debug)]
 struct Drift {
     start: NodeId,
-    /// The base includes the change up to this node.
+    /// The base of the fluent includes the change from `start` to this node.
     counted_until: NodeId,
     rate: Linear,
 }

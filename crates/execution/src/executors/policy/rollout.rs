@@ -23,7 +23,7 @@ use super::moves::wait;
 /// it, a new plan is requested, and the number of new plans is limited.
 const MAX_HAND_OVERS: usize = 10;
 
-/// Number of rehearsals within the duration of a plan if nothing happens.
+/// Number of evaluations by rollouts within the duration of a plan if nothing happens.
 const ROLLOUTS_PER_PLAN: i64 = 8;
 
 /// Executor that follows plans as `live` does, or hands them over to an executor that does better.
@@ -55,13 +55,13 @@ pub(super) struct RolloutExecutor {
     pending_news: Vec<PlanEvent>,
     /// `true` if the plan is new.
     is_new: bool,
-    /// `true` if a rehearsal is due that had to be postponed.
+    /// `true` if an evaluation by rollouts is due that had to be postponed.
     is_rollout_due: bool,
     /// `true` if a rehearsal would have the same result as the last one: that one took place while
     /// no action was running, or found no need for alternatives, and nothing has been learnt about
     /// the world since.
     is_result_unchanged: bool,
-    /// The time of the last rehearsal, and the time between rehearsals.
+    /// The time of the last rollouts, and the time between two evaluations by rollouts.
     last_rollout: Option<Rational>,
     period: Rational,
 }
@@ -215,13 +215,13 @@ impl RolloutExecutor {
         }
     }
 
-    /// Returns `true` if a rehearsal is to be made now. `kept` is the decision of the present
+    /// Returns `true` if rollouts are to be made now. `kept` is the decision of the present
     /// executor.
     fn is_rollout_needed(&mut self, moment: &DecisionContext<'_>, kept: &Decided) -> bool {
         let may_matter = |news: &PlanEvent| !matches!(news, PlanEvent::Started { .. });
         let is_due = |looked: &Rational| *moment.now >= looked + &self.period;
         let is_due = self.last_rollout.as_ref().is_none_or(is_due);
-        // A rehearsal with the same samples of an unchanged world has the same result.
+        // Rollouts with the same samples of an unchanged world have the same result.
         let may_differ = !self.is_result_unchanged || is_due && self.is_time_informative();
         let is_occasion = self.is_rollout_due
             || self.is_new
@@ -250,7 +250,7 @@ impl RolloutExecutor {
             .collect()
     }
 
-    /// Returns the decision that does best in a rehearsal. `before` is the present executor before
+    /// Returns the decision that is best in rollouts. `before` is the present executor before
     /// it decided `kept`.
     fn decide_by_rollout(
         &mut self,
@@ -339,7 +339,7 @@ impl RolloutExecutor {
     }
 
     /// Translates a decision of the present executor to the run's step numbers. A wait ends at the
-    /// latest when the next rehearsal is due.
+    /// latest when the next rollouts are due.
     fn adapt_commands(&mut self, mut decided: Decided, now: &Rational) -> Decided {
         match &mut decided.decision {
             Decision::Start(orders) => {

@@ -96,8 +96,8 @@ impl Run<'_> {
         self.agenda.push(PendingStep::ReportNews(surprises));
     }
 
-    /// Switches to a finished plan when it is due, or prepares it. Without a fit, the plan is
-    /// outdated. Returns `true` if the executor makes no decision now.
+    /// Switches to a finished plan when it is due, or prepares it. If the plan does not fit the
+    /// present state, it is outdated, and another search begins. Returns `true` if the executor makes no decision now.
     pub(super) fn switch_if_due(&mut self) -> Result<bool, Stop> {
         let view = self.view();
         let due = self

@@ -195,7 +195,7 @@ fn open_number_is_undecided() {
 
 /// Expected verdicts are those of VAL at `-t 0.001`, for x = 9.99995, 10, 10.00005.
 #[test]
-fn slack_forgives_conditions_of_one_moment_and_no_over_all_condition() {
+fn tolerance_applies_to_momentary_but_not_to_over_all_conditions() {
     let table = [
         ("(< x 10)", "+++", "+--"),
         ("(<= x 10)", "+++", "++-"),

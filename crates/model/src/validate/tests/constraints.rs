@@ -1,4 +1,4 @@
-//! Constraints on the course of a plan, and preferences.
+//! Trajectory constraints, and preferences.
 
 #![allow(
     clippy::format_collect,

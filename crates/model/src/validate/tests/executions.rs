@@ -138,7 +138,7 @@ fn action_is_validated_against_unmodified_domain() {
 }
 
 #[test]
-fn numbers_move_while_an_action_runs() {
+fn numbers_change_continuously_while_action_runs() {
     let world = World::new("(= x 0)")
         .durative("fill", &[("duration", "(= 4)"), ("rate", "x 2")])
         .instant("use", "(>= x 5)", "(decrease x 5)");

@@ -270,7 +270,8 @@ impl Annotations {
         [Added(fact), Deleted(fact)].map(|access| self.number(access).unwrap_or(NONE))
     }
 
-    /// Returns `true` if some happening makes the access and some happening waits for it.
+    /// Returns `true` if some happening has this access to the state, and another happening has to
+    /// wait for it.
     pub(super) fn has(&self, access: Access) -> bool {
         self.number(access).is_some()
     }

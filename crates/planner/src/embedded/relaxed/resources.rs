@@ -256,18 +256,18 @@ fn note_ceilings(compiled: &Compiled, action: &Action, ceilings: &mut [Option<f6
     }
 }
 
-/// Returns the least value of a fluent after a change, by a condition before it.
+/// Returns the least value of a fluent after a change, if the condition holds before the change.
 fn least(compiled: &Compiled, condition: &Formula, change: (u32, f64)) -> Option<f64> {
     bounds(compiled, condition, change, true).max_by(f64::total_cmp)
 }
 
-/// Returns the highest value of a fluent after a change, by a condition before it.
+/// Returns the highest value of a fluent after a change, if the condition holds before the change.
 fn most(compiled: &Compiled, condition: &Formula, change: (u32, f64)) -> Option<f64> {
     bounds(compiled, condition, change, false).min_by(f64::total_cmp)
 }
 
-/// Returns the lower or the upper bounds on a fluent after a change, by the conjuncts of a
-/// condition before it. A conjunct that also reads `?duration` is assumed to include the change
+/// Returns the lower or the upper bounds on a fluent after a change that follow from the conjuncts
+/// of a condition that holds before the change. A conjunct that also reads `?duration` is assumed to include the change
 /// already.
 fn bounds(
     compiled: &Compiled,

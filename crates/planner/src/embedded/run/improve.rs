@@ -257,7 +257,7 @@ impl<'a> Planner<'a> {
         if has_second && refiners.len() == 1 {
             refiners.push(LocalSearch::new(compiled, 2));
         }
-        // A repair frees its memory at its end, so this memory is not part of the counts.
+        // A repair frees its memory when it ends, so `counts.memory` does not include it.
         let room = frame.settings.max_memory;
         let room = room.saturating_sub(self.progress.counts.memory) / REPAIRS_SHARE;
         for refiner in &mut refiners {

@@ -41,7 +41,7 @@ const REPORT_TURNS: u64 = 256;
 #[derive(Clone, Copy)]
 pub(in super::super) struct Frame<'a> {
     pub(in super::super) task: &'a Task,
-    /// The task with constraints on the course of plans, and its situation, if the search ignores some.
+    /// The task with trajectory constraints, and its situation, if the search ignores some.
     pub(in super::super) constrained: Option<(&'a Task, &'a Situation)>,
     pub(in super::super) situation: &'a Situation,
     pub(in super::super) settings: &'a Settings,

@@ -1,4 +1,4 @@
-//! Constraints on the course of a plan.
+//! Trajectory constraints.
 
 use std::ops::ControlFlow;
 

@@ -378,7 +378,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_domain_has_the_name_behind_its_first_word() {
+    fn domain_name_is_read_from_define_form() {
         for (text, name) in [
             (
                 "; (domain no)\n(define (domain Yard)\n (:requirements))",

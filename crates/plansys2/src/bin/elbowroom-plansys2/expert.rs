@@ -41,7 +41,7 @@ impl Expert {
     /// Joins the topics and services of the problem expert.
     ///
     /// # Errors
-    /// DDS refuses; the text says what.
+    /// When DDS reports an error, which the text describes.
     pub(super) fn join(network: &mut Network) -> Result<Self, String> {
         network.subscribe(
             "problem_expert/update_notify",

@@ -138,7 +138,7 @@ impl Network {
     /// Creates a publisher of a topic.
     ///
     /// # Errors
-    /// DDS refuses; the text says what.
+    /// When DDS reports an error, which the text describes.
     pub(super) fn publish<T>(
         &self,
         name: &str,
@@ -158,7 +158,7 @@ impl Network {
     /// Subscribes to a topic. Messages arrive once [`Self::listen`] is called.
     ///
     /// # Errors
-    /// DDS refuses; the text says what.
+    /// When DDS reports an error, which the text describes.
     pub(super) fn subscribe<T>(
         &mut self,
         name: &str,
@@ -176,7 +176,7 @@ impl Network {
     /// Offers a service. `kind` is its type, as in `plansys2_msgs::srv::dds_::GetPlan`.
     ///
     /// # Errors
-    /// DDS refuses; the text says what.
+    /// When DDS reports an error, which the text describes.
     pub(super) fn serve<Request, Response>(
         &mut self,
         name: &str,
@@ -210,7 +210,7 @@ impl Network {
     /// clients included.
     ///
     /// # Errors
-    /// DDS refuses; the text says what.
+    /// When DDS reports an error, which the text describes.
     pub(super) fn ask<Request, Response>(
         &mut self,
         name: &str,
@@ -242,7 +242,7 @@ impl Network {
     /// Starts a thread that sends all received messages to `inputs`.
     ///
     /// # Errors
-    /// The system refuses; the text says what.
+    /// When the system reports an error, which the text describes.
     pub(super) fn listen(&mut self, inputs: Sender<Input>) -> Result<(), String> {
         let failed = |e: io::Error| format!("cannot listen to the network: {e}");
         let mut poll = Poll::new().map_err(failed)?;

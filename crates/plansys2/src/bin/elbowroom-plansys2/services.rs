@@ -62,7 +62,7 @@ impl Services {
     /// Offers all services and topics.
     ///
     /// # Errors
-    /// DDS refuses; the text says what.
+    /// When DDS reports an error, which the text describes.
     pub(super) fn offer(network: &mut Network) -> Result<Self, String> {
         let ask = |asked| Input::ServiceRequest(Box::new(asked));
         let (mut state, mut change) = (Vec::new(), Vec::new());

@@ -26,7 +26,7 @@ impl Topics {
     /// Joins all topics. With `is_shared`, other executors may use the performers as well.
     ///
     /// # Errors
-    /// DDS refuses; the text says what.
+    /// When DDS reports an error, which the text describes.
     pub(super) fn join(network: &mut Network, is_shared: bool) -> Result<Self, String> {
         let execution = "plansys2_msgs::msg::dds_::ActionExecution_";
         network.subscribe("actions_hub", execution, &reliable(100), Input::Hub)?;

@@ -153,7 +153,7 @@ impl StateView<'_> {
     }
 
     fn obstacle(&self, expression: &Expression, what: &str) -> Refusal {
-        Refusal::Nature {
+        Refusal::Autonomous {
             place: self.reading.location.to_owned(),
             obstacle: format!("{} {what}", self.task.describe_expression(expression)),
         }
@@ -169,7 +169,7 @@ impl StateView<'_> {
             let SignConstraint { now, is_strict, .. } = demand;
             let rate = now.rate.as_constant();
             if now.value.as_constant().is_some_and(Rational::is_zero) {
-                let rate = rate.ok_or_else(|| Refusal::Nature {
+                let rate = rate.ok_or_else(|| Refusal::Autonomous {
                     place: self.reading.location.to_owned(),
                     obstacle: "the direction in which a number leaves the bound of a condition \
                                depends on parameters"

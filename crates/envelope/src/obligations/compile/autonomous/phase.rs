@@ -23,7 +23,8 @@ use crate::obligations::timeline::{Reading, Timeline};
 use crate::obligations::{Inequality, Obligations, Refusal, Requirement};
 use segment::Segment;
 
-/// Limit on the turns of events and processes between two happenings of the plan.
+/// Limit on the transitions (events, starts and stops of processes) between two happenings of the
+/// plan.
 const MAX_TRANSITIONS: usize = 200;
 
 /// Symbolic state at a moment, and the changes since the previous happening.
@@ -32,8 +33,8 @@ pub(super) struct Phase<'a> {
     autonomous: &'a AutonomousModel,
     node: NodeId,
     next: Option<NodeId>,
-    /// Running actions, each with its over-all conditions that nature may violate. The entry
-    /// without an action holds the conditions on all states.
+    /// Running actions, each with its over-all conditions that processes or events may violate. The
+    /// entry without an action holds the conditions on all states.
     running: Vec<(Option<InstanceId>, Vec<&'a Condition>)>,
     /// The continuous changes of the running actions.
     drifts: Vec<(FluentId, Linear)>,
@@ -55,7 +56,7 @@ pub(super) struct Phase<'a> {
     obligations: &'a mut Obligations,
 }
 
-/// Changes made by nature.
+/// Changes made by processes and events.
 pub(super) struct PhaseChanges {
     pub(super) facts: Vec<(FactId, bool)>,
     pub(super) values: Vec<(FluentId, Option<Linear>)>,
@@ -65,7 +66,7 @@ pub(super) struct PhaseChanges {
 impl<'a> Phase<'a> {
     /// Creates the course right after a happening.
     pub(super) fn starting_after(
-        (compiler, nature): (&'a Compiler<'a>, &'a AutonomousModel),
+        (compiler, autonomous): (&'a Compiler<'a>, &'a AutonomousModel),
         run: &'a Run,
         (node, next): (NodeId, Option<NodeId>),
         obligations: &'a mut Obligations,
@@ -73,7 +74,7 @@ impl<'a> Phase<'a> {
         let plan = &compiler.plan.plan;
         let position = |node: NodeId| compiler.order.iter().position(|other| *other == node);
         let here = Some(run.position);
-        let mut running = vec![(None, nature.state_constraints.iter().collect())];
+        let mut running = vec![(None, autonomous.state_constraints.iter().collect())];
         for (index, instance) in plan.instances.iter().enumerate() {
             let id = InstanceId::from(index);
             let Some(body) = instance.action.durative() else {
@@ -81,13 +82,13 @@ impl<'a> Phase<'a> {
             };
             if position(plan.start(id)) <= here && here < position(plan.end(id)) {
                 let conditions = body.over_all.conjuncts().into_iter();
-                let touched = conditions.filter(|own| nature.changes(compiler.task, own));
+                let touched = conditions.filter(|own| autonomous.changes(compiler.task, own));
                 running.push((Some(id), touched.collect()));
             }
         }
         Self {
             compiler,
-            autonomous: nature,
+            autonomous,
             node,
             next,
             running,
@@ -155,9 +156,9 @@ impl<'a> Phase<'a> {
             self.settle()?;
             self.require_conditions_now(!self.has_elapsed())?;
             let until = time_of(next);
-            let turn = self.next_transition(&until)?;
-            let is_arrival = turn.is_none();
-            let part = self.segment_until(turn.unwrap_or(until))?;
+            let transition = self.next_transition(&until)?;
+            let is_arrival = transition.is_none();
+            let part = self.segment_until(transition.unwrap_or(until))?;
             if let Some(pause) = part.split_at.clone() {
                 let part = self.segment_until(pause)?;
                 self.advance_to_transition(part)?;
@@ -185,7 +186,7 @@ impl<'a> Phase<'a> {
         )))
     }
 
-    /// Advances to a turn, or to a pause.
+    /// Advances to a transition, or to a pause.
     fn advance_to_transition(&mut self, part: Segment) -> Result<(), Refusal> {
         self.require_later(&part.to)?;
         self.advance(part, false)?;
@@ -240,7 +241,7 @@ impl<'a> Phase<'a> {
 
     fn obstacle(&self, obstacle: &str) -> Refusal {
         let words = (self.compiler.plan.plan).describe_node(self.compiler.task, self.node);
-        Refusal::Nature {
+        Refusal::Autonomous {
             place: format!("after {words}"),
             obstacle: obstacle.to_owned(),
         }
@@ -254,14 +255,14 @@ impl<'a> Phase<'a> {
         if own == all {
             return Ok(());
         }
-        Err(Refusal::Nature {
+        Err(Refusal::Autonomous {
             place: name.to_owned(),
             obstacle: "a derived predicate compares numbers".to_owned(),
         })
     }
 
     fn require(&mut self, course: &str, broken: Alternatives) {
-        let requirement = Requirement::Nature {
+        let requirement = Requirement::Autonomous {
             after: self.node,
             course: course.to_owned(),
         };
@@ -270,7 +271,7 @@ impl<'a> Phase<'a> {
     }
 
     /// Adds the requirement ([`demand`](Self::demand)) that the course stays as in the nominal
-    /// schedule. Refused if the order of coinciding turns is unknown.
+    /// schedule. Refused if the order of coinciding transitions is unknown.
     fn require_nominal(&mut self, course: &str, broken: Alternatives) -> Result<(), Refusal> {
         if self.holds_nominally(&broken) {
             return Err(self.obstacle(
@@ -325,10 +326,10 @@ impl<'a> Phase<'a> {
         self.require_nominal(&course, vec![vec![broken]])
     }
 
-    /// Requires that the turn comes after this moment.
-    fn require_later(&mut self, turn: &Linear) -> Result<(), Refusal> {
+    /// Requires that the transition comes after this moment.
+    fn require_later(&mut self, transition: &Linear) -> Result<(), Refusal> {
         let broken = Inequality {
-            expression: turn.minus(&self.at),
+            expression: transition.minus(&self.at),
             is_strict: false,
         };
         let course = "events, and processes that start or stop, must keep their order";

@@ -1,4 +1,4 @@
-//! The moment of nature's next turn.
+//! The time of the next transition: an event, or the start or stop of a process.
 
 use std::collections::BTreeSet;
 
@@ -11,8 +11,8 @@ use crate::linear::Linear;
 use crate::obligations::Refusal;
 
 impl Phase<'_> {
-    /// Returns the moment of the next turn before `until`: an event's condition becomes true, or a
-    /// process starts or stops, in the nominal schedule.
+    /// Returns the time of the next transition before `until`: an event's condition becomes true,
+    /// or a process starts or stops, in the nominal schedule.
     pub(super) fn next_transition(&self, until: &Linear) -> Result<Option<Linear>, Refusal> {
         let view = self.view(&self.now);
         let length = view.nominal_value(until) - view.nominal_value(&self.at);

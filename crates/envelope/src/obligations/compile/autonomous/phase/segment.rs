@@ -1,4 +1,4 @@
-//! Requirements on a part: an interval without turns, with constant rates of change.
+//! Requirements on a part: an interval without transitions, with constant rates of change.
 
 use elbowroom_model::ground::{Condition, Expression};
 use elbowroom_num::Rational;

@@ -2,9 +2,9 @@
 //! in the published order of the parameters and in random ones.
 //!
 //! ```text
-//! cargo run --release -p elbowroom --example shares -- DATA [ORDERS] [STEPS]
-//! cargo run --release -p elbowroom --example shares -- DATA times [STEPS]
-//! cargo run --release -p elbowroom --example shares -- DATA volume
+//! cargo run --release -p elbowroom --example irr_ratio -- DATA [ORDERS] [STEPS]
+//! cargo run --release -p elbowroom --example irr_ratio -- DATA times [STEPS]
+//! cargo run --release -p elbowroom --example irr_ratio -- DATA volume
 //! ```
 //!
 //! The second command prints the computation times of the largest box for each guarantee and

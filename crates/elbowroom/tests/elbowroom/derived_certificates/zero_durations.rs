@@ -54,7 +54,7 @@ fn certificates_are_accepted_if_a_condition_over_all_limits_a_duration_to_zero()
 /// Instances of duration 0, so that their over-all condition is never read. Other instances make it
 /// false, before and at the same time.
 #[test]
-fn certificates_are_accepted_if_earlier_instances_delete_a_condition_over_no_time() {
+fn certificates_are_accepted_if_earlier_instances_delete_a_vacuous_over_all_condition() {
     let mut accepted = 0;
     for effects in [
         "(at start (not (open)))",

@@ -73,7 +73,7 @@ fn cells() -> impl Strategy<Value = (Cell, Reach)> {
 
 proptest! {
     #[test]
-    fn no_interval_of_a_cell_is_above_a_bound_on_it(
+    fn bound_on_cell_exceeds_all_its_intervals(
         chance in chances(),
         (cell, at) in cells(),
         slopes in (0..20_i64, 0..20_i64),
@@ -105,7 +105,7 @@ proptest! {
     }
 
     #[test]
-    fn a_bound_with_the_right_slopes_touches(
+    fn tangent_touches_at_its_point(
         density in densities(),
         (cell, at) in cells(),
         point in (1..9_i64).prop_map(|own| own * 10),
@@ -138,7 +138,7 @@ proptest! {
     }
 
     #[test]
-    fn reach_outside_support_is_impossible_or_gains_nothing(
+    fn interval_beyond_support_has_probability_zero_or_gains_nothing(
         chance in chances(),
         (_, at) in cells(),
         point in (1..9_i64).prop_map(|own| own * 10),

@@ -1,12 +1,12 @@
 //! Analysis of success probabilities, and the lattice of orders, compared with the enumeration of
 //! all worlds and all orders.
 
+use crate::reference;
 use crate::shared;
-use crate::twin;
 use std::collections::BTreeMap;
 
-use crate::twin::Worlds;
-use crate::twin::random::{Case, Taste, case, failing_in_time, order, with_failing_ends};
+use crate::reference::Worlds;
+use crate::reference::random::{Case, Taste, case, failing_in_time, order, with_failing_ends};
 use elbowroom_plan::{Node, NodeId};
 use elbowroom_probability::likelihoods::{FailureModel, PartialChange, Success};
 use elbowroom_probability::loss_analysis::LossAnalysis;
@@ -282,7 +282,7 @@ fn lattice_contains_all_orders() {
         let lattice = search
             .lattice(&case.circumstances, LatticeLimits::default())
             .unwrap();
-        let orders = twin::orders::all(&case, semantics, &search);
+        let orders = reference::orders::all(&case, semantics, &search);
         // The lattice contains coupled happenings of one moment in one order only.
         if orders.iter().any(|order| order.has_joined) {
             continue;

@@ -191,7 +191,7 @@ fn trajectory_constraint_holds_throughout_the_box() {
 }
 
 #[test]
-fn constraint_beyond_temporal_bounds_is_rejected_by_name() {
+fn inexpressible_trajectory_constraint_is_rejected_with_its_name() {
     let refused = |functions: &str, effect: &str, constraint: &str| {
         let domain = format!(
             "(define (domain d) (:predicates (p) (q)) {functions}

@@ -120,7 +120,7 @@ fn future_events_are_drawn_conditionally_on_observations() {
         .expect("it works");
     belief.advance(&Rational::from(4)).expect("it works");
     let drawn = (0..4000).map(|seed| {
-        let mut world = model.world_amid(&belief, seed, &ObservedChanges::default());
+        let mut world = model.world_in_mid_execution(&belief, seed, &ObservedChanges::default());
         simulate(&task, world.as_mut())
     });
     let drawn: Vec<EventTimes> = drawn.collect();
@@ -149,7 +149,7 @@ fn observed_event_does_not_recur() {
         }],
     };
     let again = (0..200).filter(|seed| {
-        let mut world = model.world_amid(&belief, *seed, &seen);
+        let mut world = model.world_in_mid_execution(&belief, *seed, &seen);
         simulate(&task, world.as_mut()).door_shut.is_some()
     });
     // The other event finds the door shut already. It is reported and changes nothing.
@@ -164,7 +164,7 @@ fn same_seed_continues_identically() {
     let model = WorldModel::read(WORLD, task.problem()).expect("it works");
     let belief = BeliefState::new(Arc::clone(&task));
     let one = |seed| {
-        let mut world = model.world_amid(&belief, seed, &ObservedChanges::default());
+        let mut world = model.world_in_mid_execution(&belief, seed, &ObservedChanges::default());
         simulate(&task, world.as_mut())
     };
     assert!((0..20).all(|seed| one(seed) == one(seed)));
