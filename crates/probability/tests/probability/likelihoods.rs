@@ -376,7 +376,7 @@ text:1:1: error: the version of the format is missing; version = 1",
         ),
         (
             &format!("{HEAD}[facts.open]\n"),
-            "text:1:1: error: the file does not define how likely (shut a) is to start; [actions.shut], or [defaults]",
+            "text:1:1: error: the file does not define how likely (shut a) is to start; give `start` and `effect` in [actions.shut], or in [defaults]",
         ),
     ] {
         let found = mistakes(text);

@@ -49,7 +49,10 @@ impl Reader<'_> {
                 self.mistakes.mistake(
                     section("facts"),
                     format!("the file does not define how {fact} changes by itself"),
-                    format!("[facts.{}], or [defaults]", predicate.name),
+                    format!(
+                        "give `becomes_true` and `becomes_false` in [facts.{}], or in [defaults]",
+                        predicate.name
+                    ),
                 );
             }
         }
@@ -88,7 +91,10 @@ impl Reader<'_> {
             self.mistakes.mistake(
                 section.clone(),
                 format!("the file does not define {missing}"),
-                format!("[actions.{}], or [defaults]", schema.name),
+                format!(
+                    "give `start` and `effect` in [actions.{}], or in [defaults]",
+                    schema.name
+                ),
             );
         }
     }
