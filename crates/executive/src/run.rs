@@ -233,11 +233,7 @@ impl<'a> RunAssembly<'a> {
     where
         'a: 'd,
     {
-        Decorators {
-            inputs: self.inputs,
-            operator: self.operator,
-            background,
-        }
+        Decorators::new(self.inputs, self.operator, background)
     }
 
     /// Returns the arguments for the connection to the world.
