@@ -24,7 +24,7 @@ REQUEST, RESPONSE, CONFIRM, REJECT, FEEDBACK, FINISH, CANCEL = range(1, 8)
 # plansys2_msgs/msg/ActionPerformerStatus
 NOT_READY, READY, RUNNING, FAILURE = 0, 1, 2, 4
 
-ASK_EVERY = 1.0
+REQUEST_INTERVAL = 1.0
 """Interval at which unanswered requests are repeated, in seconds. Requests may be lost while nodes discover each
 other."""
 GIVE_UP_ASKING = 30.0
@@ -36,7 +36,7 @@ IDLE_AFTER = 3.0
 has not received the order to begin, or its last message was lost."""
 
 
-class Deal:
+class Assignment:
     """An action and the performer that executes it."""
 
     def __init__(self, action, now):
@@ -53,18 +53,18 @@ class Hub:
 
     def __init__(self, send, clock=time.monotonic):
         self._send, self._clock = send, clock
-        self._deals = {}
-        self._heard = {}
+        self._assignments = {}
+        self._performers = {}
         self._lock = threading.RLock()
 
     def begin(self, action):
         """Searches for a performer. Messages do not identify the execution, so the same action cannot be
         executed twice at the same time: the second execution fails."""
         with self._lock:
-            deal = Deal(action, self._clock())
-            there = self._deals.get(deal.key)
+            assignment = Assignment(action, self._clock())
+            there = self._assignments.get(assignment.key)
             if there is None:
-                self._deals[deal.key] = deal
+                self._assignments[assignment.key] = assignment
                 self.tick()
             elif there.cancelled is None:
                 action.failed(f"{there.performer or 'a performer'} is still busy with the same action")
@@ -75,15 +75,15 @@ class Hub:
         """Sends a cancellation to the performer. PlanSys2 has no answer to it: the action counts as stopped when the
         performer's status is no longer RUNNING."""
         with self._lock:
-            deal = self._deals.get((action.name, tuple(action.arguments)))
-            if deal is None or deal.action is not action or deal.cancelled is not None:
+            assignment = self._assignments.get((action.name, tuple(action.arguments)))
+            if assignment is None or assignment.action is not action or assignment.cancelled is not None:
                 return
-            if deal.performer is None:
-                del self._deals[deal.key]
+            if assignment.performer is None:
+                del self._assignments[assignment.key]
                 action.was_cancelled()
                 return
-            deal.cancelled = self._clock()
-            self._tell(CANCEL, deal, deal.performer)
+            assignment.cancelled = self._clock()
+            self._tell(CANCEL, assignment, assignment.performer)
 
     def message(self, message):
         """Processes a message on `actions_hub`. The hub also receives its own messages."""
@@ -92,87 +92,87 @@ class Hub:
         if arguments == (name,):
             arguments = ()  # PlanSys2 2.0 sends an action without arguments as its own argument
         with self._lock:
-            deal, node = self._deals.get((name, arguments)), message.node_id
+            assignment, node = self._assignments.get((name, arguments)), message.node_id
             if message.type == RESPONSE:
-                if deal is None or deal.performer not in (None, node):
+                if assignment is None or assignment.performer not in (None, node):
                     # Every response needs a confirmation or a rejection, also for abandoned
                     # actions.
                     self._send(REJECT, node, message.action, list(message.arguments))
-                elif deal.performer is None:
-                    deal.performer, deal.since = node, self._clock()
-                    self._tell(CONFIRM, deal, node)
-                    if deal.action.duration is not None:
-                        deal.action.started()
-            elif deal is None or node != deal.performer:
+                elif assignment.performer is None:
+                    assignment.performer, assignment.since = node, self._clock()
+                    self._tell(CONFIRM, assignment, node)
+                    if assignment.action.duration is not None:
+                        assignment.action.started()
+            elif assignment is None or node != assignment.performer:
                 return
             elif message.type == FEEDBACK:
-                deal.since, deal.idle = self._clock(), None
-                if deal.cancelled is None:
-                    deal.action.feedback(message.completion, message.status)
+                assignment.since, assignment.idle = self._clock(), None
+                if assignment.cancelled is None:
+                    assignment.action.feedback(message.completion, message.status)
             elif message.type == FINISH:
-                del self._deals[deal.key]
+                del self._assignments[assignment.key]
                 if not message.success:
-                    deal.action.failed(message.status or f"{node} gave no reason")
-                elif deal.action.duration is None:
-                    deal.action.started()
+                    assignment.action.failed(message.status or f"{node} gave no reason")
+                elif assignment.action.duration is None:
+                    assignment.action.started()
                 else:
-                    deal.action.succeeded()
+                    assignment.action.succeeded()
 
     def status(self, status):
         """Processes a message on `performers_status`."""
         with self._lock:
             now = self._clock()
-            self._heard[status.node_name] = now, getattr(status, "action", "")
-            for deal in list(self._deals.values()):
-                if deal.performer != status.node_name:
+            self._performers[status.node_name] = now, getattr(status, "action", "")
+            for assignment in list(self._assignments.values()):
+                if assignment.performer != status.node_name:
                     continue
-                if deal.cancelled is not None:
+                if assignment.cancelled is not None:
                     if status.state != RUNNING:
-                        del self._deals[deal.key]
-                        deal.action.was_cancelled()
+                        del self._assignments[assignment.key]
+                        assignment.action.was_cancelled()
                 elif status.state == FAILURE:
-                    self._lose(deal, f"{deal.performer} reports a failure")
+                    self._lose(assignment, f"{assignment.performer} reports a failure")
                 elif status.state == RUNNING:
-                    deal.idle = None
+                    assignment.idle = None
                 else:
-                    deal.idle = now if deal.idle is None else deal.idle
-                    if now - deal.idle >= IDLE_AFTER:
-                        self._lose(deal, f"{deal.performer} is idle, and has not reported the outcome")
+                    assignment.idle = now if assignment.idle is None else assignment.idle
+                    if now - assignment.idle >= IDLE_AFTER:
+                        self._lose(assignment, f"{assignment.performer} is idle, and has not reported the outcome")
 
     def performers(self):
         """Returns the performers that have sent a status recently, each with its action: `robot1 (move)`."""
         with self._lock:
             now = self._clock()
-            lately = sorted((name, action) for name, (at, action) in self._heard.items() if now - at <= LOST_AFTER)
+            lately = sorted((name, action) for name, (at, action) in self._performers.items() if now - at <= LOST_AFTER)
             return [f"{name} ({action})" if action else name for name, action in lately]
 
     def tick(self):
         """Repeats unanswered requests and detects lost performers. Call it a few times per second."""
         with self._lock:
             now = self._clock()
-            for deal in list(self._deals.values()):
-                if deal.performer is None:
-                    if now - deal.since > GIVE_UP_ASKING:
+            for assignment in list(self._assignments.values()):
+                if assignment.performer is None:
+                    if now - assignment.since > GIVE_UP_ASKING:
                         others = ", ".join(self.performers()) or "none"
                         why = f"no performer answered within {GIVE_UP_ASKING:g} s; discovered performers: {others}"
-                        self._lose(deal, why)
-                    elif deal.asked is None or now - deal.asked >= ASK_EVERY:
-                        deal.asked = now
-                        self._tell(REQUEST, deal, "elbowroom")
+                        self._lose(assignment, why)
+                    elif assignment.asked is None or now - assignment.asked >= REQUEST_INTERVAL:
+                        assignment.asked = now
+                        self._tell(REQUEST, assignment, "elbowroom")
                     continue
-                heard, _ = self._heard.get(deal.performer, (None, ""))
-                if heard is not None and now - max(heard, deal.since) > LOST_AFTER:
-                    self._lose(deal, f"{deal.performer} is lost: no message from it for {LOST_AFTER:g} s")
+                heard, _ = self._performers.get(assignment.performer, (None, ""))
+                if heard is not None and now - max(heard, assignment.since) > LOST_AFTER:
+                    self._lose(assignment, f"{assignment.performer} is lost: no message from it for {LOST_AFTER:g} s")
 
-    def _lose(self, deal, why):
-        del self._deals[deal.key]
-        if deal.performer is not None:
+    def _lose(self, assignment, why):
+        del self._assignments[assignment.key]
+        if assignment.performer is not None:
             # The performer may still be running.
-            self._tell(CANCEL, deal, deal.performer)
-        deal.action.failed(why)
+            self._tell(CANCEL, assignment, assignment.performer)
+        assignment.action.failed(why)
 
-    def _tell(self, kind, deal, node):
-        self._send(kind, node, deal.action.name, list(deal.action.arguments))
+    def _tell(self, kind, assignment, node):
+        self._send(kind, node, assignment.action.name, list(assignment.action.arguments))
 
 
 class Claim:
@@ -186,12 +186,17 @@ class Claim:
         self._publish, self._clock = publish, clock
         self.id = uuid.uuid4().hex
         self._name = f"process {os.getpid()} on {socket.gethostname()}"
-        self._held_since, self._last = None, None
+        self._held_since, self._last, self._is_released = None, None, False
         self.refusal = None
 
     def hold(self):
         self._held_since = self._clock()
         self.tick()
+
+    def release(self):
+        """Gives up the claim, so that another executor can start at once."""
+        self._is_released = True
+        self._publish(f"released {self.id} {self._name}")
 
     def _state(self):
         if self._held_since is None:
@@ -200,7 +205,7 @@ class Claim:
 
     def tick(self):
         """Publishes the claim if its state has changed."""
-        if self._last != (state := self._state()):
+        if not self._is_released and self._last != (state := self._state()):
             self._last = state
             self._publish(f"{self.STATES[state]} {self.id} {self._name}")
 
@@ -265,14 +270,19 @@ def main():
         world.starter("*")(hub.begin)
         world.canceller(hub.cancel)
         world.run()
+        claim.release()
         # Cancellations need time to reach the performers.
         time.sleep(0.2)
     # Stop the thread of ROS first: Python must not end while it is running.
     executor.shutdown()
     rclpy.try_shutdown()
     spinning.join(timeout=5)
+    node.destroy_node()
     if claim.refusal is not None:
-        sys.exit(f"error: {claim.refusal}")
+        print(f"error: {claim.refusal}", file=sys.stderr)
+    # Elbowroom waits a second for the end of this program, and unloading all libraries takes much of it.
+    sys.stderr.flush()
+    os._exit(0 if claim.refusal is None else 1)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ import unittest
 from types import SimpleNamespace
 
 from plansys2_world import (
-    CANCEL, CONFIRM, FAILURE, FEEDBACK, FINISH, READY, REJECT, REQUEST, RESPONSE, RUNNING, Hub,
+    CANCEL, CONFIRM, FAILURE, FEEDBACK, FINISH, READY, REJECT, REQUEST, RESPONSE, RUNNING, Claim, Hub,
 )  # fmt: skip
 
 
@@ -188,6 +188,27 @@ class Performers(unittest.TestCase):
             self.says(RESPONSE, name="beep", arguments=arguments)
             self.says(FINISH, name="beep", arguments=arguments, success=True)
             self.assertEqual(action.told, ["started"])
+
+
+class Claims(unittest.TestCase):
+    def setUp(self):
+        self.now, self.texts = 0.0, []
+        self.first = Claim(self.texts.append, lambda: self.now)
+        self.second = Claim(lambda _: None, lambda: self.now)
+
+    def test_second_executor_gives_way_to_a_holder(self):
+        self.first.hold()
+        self.second.check(self.texts[-1])
+        self.assertIn("another executor, process", self.second.refusal)
+
+    def test_released_claim_is_ignored(self):
+        self.first.hold()
+        self.now = 10.0
+        self.first.release()
+        self.first.tick()
+        self.assertTrue(self.texts[-1].startswith("released "), self.texts)
+        self.second.check(self.texts[-1])
+        self.assertIsNone(self.second.refusal)
 
 
 if __name__ == "__main__":

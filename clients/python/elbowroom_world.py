@@ -82,6 +82,8 @@ class Action:
         """The start time on the world's clock."""
         self.is_resumed = False
         """``True`` if the action was running before this program was restarted."""
+        self.memory: str | None = None
+        """The text of :meth:`remember`, also after a restart."""
         self._world = world
         self._cancelled = threading.Event()
 
@@ -92,7 +94,19 @@ class Action:
 
     def sleep(self, seconds: float) -> bool:
         """Waits for ``seconds`` of the world's time; returns ``False`` early when cancelled."""
-        return not self._cancelled.wait(max(0.0, seconds) / self._world.speed)
+        if self._world._interval is None:
+            return not self._cancelled.wait(max(0.0, seconds) / self._world.speed)
+        until = self._world.now() + seconds
+        while self._world.now() < until:
+            if self._cancelled.wait(self._world._interval):
+                return False
+        return not self.is_cancelled
+
+    def remember(self, text: str) -> None:
+        """Stores a text, such as the number of a robot's job, in :attr:`memory` and in the ledger, if there is one."""
+        self.memory = text
+        if self._world._ledger is not None:
+            self._world._ledger.write(ticket=self.ticket, memory=text)
 
     def feedback(self, completion: float | None = None, note: str = "") -> None:
         """Reports progress: the completion from 0 to 1, and a note for the trace."""
@@ -139,15 +153,26 @@ class World:
     Elbowroom: it records each start before the action begins, and each end, and reports these
     outcomes after ``elbowroom run --resume``. Only one program at a time uses a ledger: a second
     one waits until the first one has ended.
+
+    ``clock``: a function that returns the present time in seconds, in place of the monotonic clock of the system, for
+    example that of a simulator. It must not decrease.
     """
 
     capabilities: Iterable[str] = ("cancel", "feedback", "facts")
 
     def __init__(
-        self, name: str = "world", *, speed: float = 1.0, ledger: str | os.PathLike[str] | None = None
+        self,
+        name: str = "world",
+        *,
+        speed: float = 1.0,
+        ledger: str | os.PathLike[str] | None = None,
+        clock: Callable[[], float] | None = None,
     ) -> None:
         if not speed > 0:
             raise ValueError(f"speed must be above 0, not {speed!r}")
+        self._read = clock or _time.monotonic
+        # Interval at which another clock is read during a wait, in real seconds.
+        self._interval = None if clock is None else 0.02
         self.name, self.speed = name, speed
         self._ledger = _Ledger(ledger) if ledger is not None else None
         self._does: dict[str, tuple[str, Does]] = {}
@@ -165,7 +190,7 @@ class World:
         self._version = 1
         # Set when Elbowroom has ended.
         self._is_alone = threading.Event()
-        # Reading of the monotonic clock at the world's time 0. That is the first message after the
+        # Reading of the clock at the world's time 0. That is the first message after the
         # greeting, so that preparations take no time.
         self._zero: float | None = None
 
@@ -242,7 +267,7 @@ class World:
 
     def now(self) -> float:
         """Returns the present time: seconds since the run began."""
-        return 0.0 if self._zero is None else (_time.monotonic() - self._zero) * self.speed
+        return 0.0 if self._zero is None else (self._read() - self._zero) * self.speed
 
     # Communication.
 
@@ -297,7 +322,8 @@ class World:
             return self._inbox.get()
         left = max(0.0, (_number(question.get("until")) or 0.0) - self.now()) / self.speed
         try:
-            return self._inbox.get(timeout=min(left, threading.TIMEOUT_MAX))
+            most = threading.TIMEOUT_MAX if self._interval is None else self._interval
+            return self._inbox.get(timeout=min(left, most))
         except queue.Empty:
             return ("time",)
 
@@ -353,10 +379,10 @@ class World:
 
     def _begin_time(self) -> None:
         if self._zero is None:
-            self._zero = _time.monotonic()
+            self._zero = self._read()
             if self._ledger is not None:
-                # Only the wall clock continues over a restart.
-                self._ledger.write(zero=_time.time())
+                # The monotonic clock does not continue over a restart, but the wall clock does.
+                self._ledger.write(zero=_time.time() if self._interval is None else self._zero)
 
     def _greet(self, message: dict[str, Any]) -> None:
         resumed = message.get("resumed")
@@ -366,6 +392,10 @@ class World:
                 self._ledger.begin()
             else:
                 self._remember(self._ledger.read())
+        missing = [name for name in message.get("actions", []) if name.lower() not in self._does]
+        if missing and "*" not in self._does:
+            print(f"{self.name}: these actions will fail, as they have no function: {', '.join(missing)}",
+                  file=sys.stderr)  # fmt: skip
         if VERSION not in message.get("versions", [message.get("version")]):
             return
         self._version = VERSION
@@ -500,6 +530,8 @@ class World:
                 continue
             if "report" in line:
                 self._ended[line["report"]["ticket"]] = line["report"]
+            elif "memory" in line:
+                self._actions[line["ticket"]].memory = line["memory"]
             elif "ticket" in line:
                 action = Action(self, line["ticket"], line["action"], line.get("duration"))
                 action.start, action.is_resumed = line["start"], True
@@ -520,17 +552,19 @@ class World:
             self._resumed(under_way)
 
     def _continue_time(self, lines: list[dict[str, Any]]) -> None:
-        """Sets the world's time after a restart, by the wall clock, but not before the last time in the ledger."""
+        """Sets the world's time after a restart, by the wall clock or the world's own, but not before the last time in the
+        ledger."""
         for line in lines:
             if "zero" in line:
-                self._zero = _time.monotonic() - (_time.time() - line["zero"])
+                is_other = self._interval is not None
+                self._zero = line["zero"] if is_other else self._read() - (_time.time() - line["zero"])
         if self._zero is None:
             return
         times = [line.get("report", {}).get("time", line.get("start", 0.0)) for line in lines]
         last = max(time for time in times if time is not None)
         if self.now() < last:
-            print(f"{self.name}: the system clock was set back; time continues at {last:.3f} s", file=sys.stderr)
-            self._zero = _time.monotonic() - last / self.speed
+            print(f"{self.name}: the clock was set back; time continues at {last:.3f} s", file=sys.stderr)
+            self._zero = self._read() - last / self.speed
 
     def _leave(self) -> None:
         """Stops the running actions when the run is over or Elbowroom has ended, unless they can be resumed."""
@@ -702,6 +736,7 @@ class _Ledger:
         self._path = os.fspath(path)
         self._file: TextIO | None = None
         self._lock: TextIO | None = None
+        self._writing = threading.Lock()
 
     def claim(self, is_over: Callable[[], bool]) -> None:
         """Waits until no other program uses this ledger, because actions of that program may continue until it ends. The
@@ -746,9 +781,10 @@ class _Ledger:
 
     def write(self, **line: Any) -> None:
         assert self._file is not None, "a ledger must begin with the greeting"
-        self._file.write(json.dumps(line) + "\n")
-        self._file.flush()
-        os.fsync(self._file.fileno())
+        with self._writing:
+            self._file.write(json.dumps(line) + "\n")
+            self._file.flush()
+            os.fsync(self._file.fileno())
 
 
 if sys.platform == "win32":

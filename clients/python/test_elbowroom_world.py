@@ -89,6 +89,51 @@ def kinds(reports):
     return [(it["type"], it.get("outcome")) for it in reports if it["type"] != "feedback"]
 
 
+class ClockTest(unittest.TestCase):
+    """A world whose time is that of a simulator."""
+
+    def setUp(self):
+        self.time = 1000.0
+        self.world = World(clock=lambda: self.time)
+
+    def test_time_is_that_of_the_clock(self):
+        slept = []
+
+        @self.world.action("drive")
+        def drive(action):
+            slept.append(action.sleep(5))
+
+        peer = Peer(self.world)
+        peer.start(0, duration=5.0)
+        reports, now = peer.wait(10)
+        self.assertEqual(([it["type"] for it in reports], now), (["started"], 0.0))
+        answer = []
+        asking = threading.Thread(target=lambda: answer.append(peer.wait(20)))
+        asking.start()
+        asking.join(0.2)
+        self.assertEqual((answer, slept), ([], []), "the clock stands still")
+        self.time += 6
+        asking.join(30)
+        ((reports, now),) = answer
+        self.assertEqual(([it["outcome"] for it in reports], now, slept), (["succeeded"], 6.0, [True]))
+
+    def test_wait_ends_at_its_time(self):
+        peer = Peer(self.world)
+        peer.wait(0)
+        self.time += 3
+        self.assertEqual(peer.wait(2.5), ([], 3.0))
+
+    def test_cancelled_sleep_ends(self):
+        slept = []
+        self.world.action("drive")(lambda action: slept.append(action.sleep(5)))
+        peer = Peer(self.world)
+        peer.start(0, duration=5.0)
+        peer.wait(1)
+        peer.tell(type="cancel", ticket=0)
+        self.assertEqual([it["outcome"] for it in peer.wait(1)[0]], ["cancelled"])
+        self.assertEqual(slept, [False])
+
+
 class OnTheWallClock(unittest.TestCase):
     def test_an_action_runs_beside_the_conversation_and_succeeds(self):
         world = World(speed=100)
@@ -460,6 +505,33 @@ class AfterACrash(unittest.TestCase):
         peer.start(1)
         time.sleep(0.05)
         self.assertEqual(self.done, [(1, True)])
+
+    def test_remembered_text_survives_a_restart(self):
+        world = World(ledger=self.ledger)
+        world.starter("drive")(lambda action: (action.remember(f"job {action.ticket}"), action.started()))
+        peer = Peer(world)
+        for ticket in (0, 1):
+            peer.start(ticket)
+        peer.reports(2)
+        self.assertTrue(peer.hang_up())
+        world._ledger.release()
+        resumed, found = World(ledger=self.ledger), []
+        resumed.starter("drive", resumes=True)(lambda action: found.append((action.ticket, action.memory)))
+        Peer(resumed, resumed={"now": 3}).ask(type="look", facts=[], fluents=[], tickets=[0, 1])
+        self.assertEqual(found, [(0, "job 0"), (1, "job 1")])
+
+    def test_other_clock_continues_after_a_restart(self):
+        clock = {"now": 500.0}
+        world = World(ledger=self.ledger, clock=lambda: clock["now"])
+        world.starter("drive")(lambda action: action.started())
+        peer = Peer(world)
+        peer.start(0)
+        peer.reports(1)
+        self.assertTrue(peer.hang_up())
+        world._ledger.release()
+        clock["now"] = 530.0
+        peer = Peer(World(ledger=self.ledger, clock=lambda: clock["now"]), resumed={"now": 3})
+        self.assertEqual(peer.wait(0)[1], 30.0)
 
     def test_a_ledger_belongs_to_one_program_at_a_time(self):
         first = Peer(self.world(True))

@@ -33,6 +33,7 @@ mod dispatchable_cache;
 mod event;
 mod executor;
 pub mod executors;
+mod forward;
 mod measured_amounts;
 mod plan_comparison;
 mod planning;

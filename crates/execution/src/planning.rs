@@ -3,6 +3,8 @@
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
+use crate::forward::forward_port;
+
 /// Makes plans.
 pub trait Planner: Send {
     /// Makes a plan from this situation. See [`Situation`] for the form of such a plan.
@@ -37,57 +39,15 @@ pub trait Planner: Send {
     }
 }
 
-impl<P: Planner + ?Sized> Planner for &mut P {
-    fn plan(&mut self, task: &Task, situation: &Situation) -> Planned {
-        (**self).plan(task, situation)
-    }
-
-    fn expect(&mut self, task: &Task, situation: &Situation) {
-        (**self).expect(task, situation);
-    }
-
-    fn begin(&mut self, task: &Task, situation: &Situation) -> bool {
-        (**self).begin(task, situation)
-    }
-
-    fn collect(&mut self, task: &Task, situation: &Situation) -> Planned {
-        (**self).collect(task, situation)
-    }
-
-    fn give_up(&mut self) {
-        (**self).give_up();
-    }
-
-    fn is_recorded(&self) -> bool {
-        (**self).is_recorded()
-    }
-}
-
-impl<P: Planner + ?Sized> Planner for Box<P> {
-    fn plan(&mut self, task: &Task, situation: &Situation) -> Planned {
-        (**self).plan(task, situation)
-    }
-
-    fn expect(&mut self, task: &Task, situation: &Situation) {
-        (**self).expect(task, situation);
-    }
-
-    fn begin(&mut self, task: &Task, situation: &Situation) -> bool {
-        (**self).begin(task, situation)
-    }
-
-    fn collect(&mut self, task: &Task, situation: &Situation) -> Planned {
-        (**self).collect(task, situation)
-    }
-
-    fn give_up(&mut self) {
-        (**self).give_up();
-    }
-
-    fn is_recorded(&self) -> bool {
-        (**self).is_recorded()
-    }
-}
+forward_port!(Planner {
+    fn plan(&mut self, task: &Task, situation: &Situation) -> Planned;
+    fn expect(&mut self, task: &Task, situation: &Situation);
+    fn begin(&mut self, task: &Task, situation: &Situation) -> bool;
+    fn collect(&mut self, task: &Task, situation: &Situation) -> Planned;
+    fn give_up(&mut self);
+} ref {
+    fn is_recorded(&self) -> bool;
+});
 
 /// A planner's answer, with the planning time.
 #[derive(Clone, Debug, PartialEq)]

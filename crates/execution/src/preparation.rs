@@ -18,6 +18,7 @@ use elbowroom_plan::{
 use crate::dispatchable_cache::DispatchableCache;
 use crate::event::ActionHandle;
 use crate::executor::{PlanForm, PreparedPlan, StepId};
+use crate::forward::forward_port;
 
 /// A plan prepared for execution.
 #[derive(Clone, Debug)]
@@ -140,28 +141,20 @@ impl PreparationRequest<'_> {
     }
 }
 
-impl<P: Preparer + ?Sized> Preparer for &mut P {
+forward_port!(Preparer {
     fn prepare(
         &mut self,
         task: &Arc<Task>,
         plan: &TimeTriggeredPlan,
-        need: PlanForm,
-    ) -> Result<PreparationResult, PrepareError> {
-        (**self).prepare(task, plan, need)
-    }
-
-    fn begin(&mut self, wanted: &PreparationRequest<'_>) -> bool {
-        (**self).begin(wanted)
-    }
-
-    fn collect(&mut self, wanted: &PreparationRequest<'_>) -> Result<PreparedPlan, PrepareError> {
-        (**self).collect(wanted)
-    }
-
-    fn give_up(&mut self) {
-        (**self).give_up();
-    }
-}
+        need: PlanForm
+    ) -> Result<PreparationResult, PrepareError>;
+    fn begin(&mut self, wanted: &PreparationRequest<'_>) -> bool;
+    fn collect(
+        &mut self,
+        wanted: &PreparationRequest<'_>
+    ) -> Result<PreparedPlan, PrepareError>;
+    fn give_up(&mut self);
+} ref {});
 
 /// Decides for which parameter values a plan is guaranteed to work.
 pub trait RegionOracle: Send {
@@ -221,28 +214,5 @@ pub trait RegionOracle: Send {
     /// Returns a copy; `None` if it cannot be copied.
     fn fork(&self) -> Option<Box<dyn RegionOracle>> {
         None
-    }
-}
-
-impl<P: Preparer + ?Sized> Preparer for Box<P> {
-    fn prepare(
-        &mut self,
-        task: &Arc<Task>,
-        plan: &TimeTriggeredPlan,
-        need: PlanForm,
-    ) -> Result<PreparationResult, PrepareError> {
-        (**self).prepare(task, plan, need)
-    }
-
-    fn begin(&mut self, wanted: &PreparationRequest<'_>) -> bool {
-        (**self).begin(wanted)
-    }
-
-    fn collect(&mut self, wanted: &PreparationRequest<'_>) -> Result<PreparedPlan, PrepareError> {
-        (**self).collect(wanted)
-    }
-
-    fn give_up(&mut self) {
-        (**self).give_up();
     }
 }

@@ -5,6 +5,7 @@ use elbowroom_num::Rational;
 
 use crate::event::{ActionHandle, Command, Observation};
 use crate::executor::{Decided, Planned, PreparedPlan};
+use crate::forward::forward_port;
 use crate::planning::Shortfall;
 use crate::reason::Reason;
 use crate::run::{Report, RunSnapshot, Verdict};
@@ -66,33 +67,11 @@ pub trait Recorder: Send {
     }
 }
 
-impl<R: Recorder + ?Sized> Recorder for &mut R {
-    fn record(&mut self, entry: &Entry<'_>) {
-        (**self).record(entry);
-    }
-
-    fn commit(&mut self) {
-        (**self).commit();
-    }
-
-    fn begin_anew(&mut self, stand: &dyn Fn() -> RunSnapshot) -> bool {
-        (**self).begin_anew(stand)
-    }
-}
-
-impl<R: Recorder + ?Sized> Recorder for Box<R> {
-    fn record(&mut self, entry: &Entry<'_>) {
-        (**self).record(entry);
-    }
-
-    fn commit(&mut self) {
-        (**self).commit();
-    }
-
-    fn begin_anew(&mut self, stand: &dyn Fn() -> RunSnapshot) -> bool {
-        (**self).begin_anew(stand)
-    }
-}
+forward_port!(Recorder {
+    fn record(&mut self, entry: &Entry<'_>);
+    fn commit(&mut self);
+    fn begin_anew(&mut self, stand: &dyn Fn() -> RunSnapshot) -> bool;
+} ref {});
 
 /// Recorder that keeps nothing.
 #[derive(Clone, Copy, Debug, Default)]

@@ -7,6 +7,7 @@ use elbowroom_num::Rational;
 
 use crate::event::{ActionHandle, Event};
 use crate::executor::{PlanForm, PreparedPlan};
+use crate::forward::forward_port;
 use crate::planning::{Planned, Planner};
 use crate::preparation::{PreparationRequest, PrepareError, Preparer};
 use crate::world::{TimeAdvance, World, WorldError};
@@ -123,49 +124,13 @@ pub trait Workers: Send {
     }
 }
 
-impl<W: Workers + ?Sized> Workers for &mut W {
-    fn plan(&mut self, request: &PlanRequest) -> Option<Planned> {
-        (**self).plan(request)
-    }
-
-    fn prepare(&mut self, request: &PrepareRequest) -> Option<Result<PreparedPlan, PrepareError>> {
-        (**self).prepare(request)
-    }
-
-    fn abandon(&mut self, id: RequestId) {
-        (**self).abandon(id);
-    }
-
-    fn wait(&mut self, world: &mut dyn World, until: &Rational) -> Result<TimeAdvance, WorldError> {
-        (**self).wait(world, until)
-    }
-
-    fn answers(&mut self) -> Vec<Answer> {
-        (**self).answers()
-    }
-}
-
-impl<W: Workers + ?Sized> Workers for Box<W> {
-    fn plan(&mut self, request: &PlanRequest) -> Option<Planned> {
-        (**self).plan(request)
-    }
-
-    fn prepare(&mut self, request: &PrepareRequest) -> Option<Result<PreparedPlan, PrepareError>> {
-        (**self).prepare(request)
-    }
-
-    fn abandon(&mut self, id: RequestId) {
-        (**self).abandon(id);
-    }
-
-    fn wait(&mut self, world: &mut dyn World, until: &Rational) -> Result<TimeAdvance, WorldError> {
-        (**self).wait(world, until)
-    }
-
-    fn answers(&mut self) -> Vec<Answer> {
-        (**self).answers()
-    }
-}
+forward_port!(Workers {
+    fn plan(&mut self, request: &PlanRequest) -> Option<Planned>;
+    fn prepare(&mut self, request: &PrepareRequest) -> Option<Result<PreparedPlan, PrepareError>>;
+    fn abandon(&mut self, id: RequestId);
+    fn wait(&mut self, world: &mut dyn World, until: &Rational) -> Result<TimeAdvance, WorldError>;
+    fn answers(&mut self) -> Vec<Answer>;
+} ref {});
 
 /// Workers made of a planner and a preparer.
 ///

@@ -6,11 +6,12 @@ use std::sync::{Mutex, PoisonError};
 use elbowroom::answers::{Event, Observer, TrialsProgress};
 use elbowroom_report::plot::IntervalPlot;
 use elbowroom_report::table::Table;
-use elbowroom_text::{Diagnostics, Source};
+use elbowroom_text::Source;
 use serde::{Deserialize, Serialize};
 
-use crate::compare::{self, Experiment, ExperimentError, Failures, Part, Results, TrialId};
-use crate::perturbed::{self, PerturbedError, PerturbedExperiment, PerturbedResults};
+use crate::compare::{self, Experiment, Failures, Part, Results, TrialId};
+use crate::error::ExperimentError;
+use crate::perturbed::{self, PerturbedExperiment, PerturbedResults};
 use crate::record::TrialRecords;
 
 /// Experiment of either kind.
@@ -54,24 +55,6 @@ pub struct FailedTrial {
     pub id: TrialId,
 }
 
-/// Error of a comparison.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum CompareError {
-    /// The experiment file is invalid, or one that it names.
-    #[error("{0}")]
-    Text(Diagnostics),
-    /// Another error, with a message for the user.
-    #[error("{0}")]
-    Other(String),
-    /// The results are those of another experiment.
-    #[error(
-        "these are results of another experiment; expected results of parts that were made from \
-         the same files"
-    )]
-    WrongExperiment,
-}
-
 impl AnyExperiment {
     /// Reads an experiment. `file` returns the text of a file that it names.
     ///
@@ -80,7 +63,7 @@ impl AnyExperiment {
     pub fn read(
         source: &Source,
         file: &dyn Fn(&str) -> Result<String, String>,
-    ) -> Result<Self, CompareError> {
+    ) -> Result<Self, ExperimentError> {
         if PerturbedExperiment::is_experiment(source.text()) {
             let experiment = PerturbedExperiment::read(source, file)?;
             Ok(Self::Untimed(Box::new(experiment)))
@@ -123,12 +106,12 @@ impl AnyExperiment {
     ///
     /// # Errors
     /// There is no such trial.
-    pub fn traces(&self, failed: &[FailedTrial]) -> Result<Vec<String>, CompareError> {
+    pub fn traces(&self, failed: &[FailedTrial]) -> Result<Vec<String>, ExperimentError> {
         match self {
             Self::Timed(experiment) => {
                 let traces = failed.iter().map(|failed| {
                     let (row, column, _) = failed.position;
-                    Ok(compare::trace(experiment, (row, column), failed.id)?)
+                    compare::trace(experiment, (row, column), failed.id)
                 });
                 traces.collect()
             }
@@ -137,7 +120,7 @@ impl AnyExperiment {
                     .iter()
                     .map(|failed| (failed.position.0, failed.id.trial));
                 let trials: Vec<(usize, u64)> = trials.collect();
-                Ok(perturbed::repeat_trials(experiment, &trials)?)
+                perturbed::repeat_trials(experiment, &trials)
             }
         }
     }
@@ -163,7 +146,7 @@ impl AnyExperiment {
 pub fn compare(
     request: CompareRequest<'_>,
     watcher: &mut (dyn Observer + Send),
-) -> Result<CompareAnswer, CompareError> {
+) -> Result<CompareAnswer, ExperimentError> {
     compare_recorded(request, None, watcher)
 }
 
@@ -175,7 +158,7 @@ pub fn compare_recorded(
     request: CompareRequest<'_>,
     records: Option<&TrialRecords>,
     watcher: &mut (dyn Observer + Send),
-) -> Result<CompareAnswer, CompareError> {
+) -> Result<CompareAnswer, ExperimentError> {
     let CompareRequest { experiment, part } = request;
     let of = experiment.count(part);
     let shared = Mutex::new((watcher, 0));
@@ -205,10 +188,10 @@ impl CompareAnswer {
     ///
     /// # Errors
     /// The text does not contain results, or those of another experiment.
-    pub fn read(text: &str, experiment: &AnyExperiment) -> Result<Self, CompareError> {
+    pub fn read(text: &str, experiment: &AnyExperiment) -> Result<Self, ExperimentError> {
         let (answer, is_of_it) = match experiment {
             AnyExperiment::Timed(experiment) => {
-                let results = Results::read(text).map_err(|error| CompareError::other(&error))?;
+                let results = Results::read(text)?;
                 let is_of_it = results.belong_to(experiment);
                 (Self::Timed(results), is_of_it)
             }
@@ -221,7 +204,7 @@ impl CompareAnswer {
         if is_of_it {
             Ok(answer)
         } else {
-            Err(CompareError::WrongExperiment)
+            Err(ExperimentError::WrongExperiment)
         }
     }
 
@@ -229,22 +212,20 @@ impl CompareAnswer {
     ///
     /// # Errors
     /// There are no parts, they belong to different experiments, or a part occurs twice.
-    pub fn merge_results(parts: &[Self]) -> Result<Self, CompareError> {
+    pub fn merge_results(parts: &[Self]) -> Result<Self, ExperimentError> {
         let timed = parts.iter().map(|part| match part {
             Self::Timed(results) => Some(results.clone()),
             Self::Untimed(_) => None,
         });
         if let Some(timed) = timed.collect::<Option<Vec<Results>>>() {
-            let merged =
-                Results::merge_results(&timed).map_err(|error| CompareError::other(&error))?;
-            return Ok(Self::Timed(merged));
+            return Ok(Self::Timed(Results::merge_results(&timed)?));
         }
         let untimed = parts.iter().map(|part| match part {
             Self::Timed(_) => None,
             Self::Untimed(results) => Some(results.clone()),
         });
         let untimed: Option<Vec<PerturbedResults>> = untimed.collect();
-        let untimed = untimed.ok_or(CompareError::WrongExperiment)?;
+        let untimed = untimed.ok_or(ExperimentError::WrongExperiment)?;
         Ok(Self::Untimed(PerturbedResults::merge_results(&untimed)?))
     }
 
@@ -335,13 +316,13 @@ impl CompareAnswer {
     ///
     /// # Errors
     /// The results are those of another kind of experiment.
-    pub fn table(&self, experiment: &AnyExperiment) -> Result<Table, CompareError> {
+    pub fn table(&self, experiment: &AnyExperiment) -> Result<Table, ExperimentError> {
         match (self, experiment) {
             (Self::Timed(results), AnyExperiment::Timed(experiment)) => {
                 Ok(results.table(experiment))
             }
             (Self::Untimed(results), AnyExperiment::Untimed(_)) => Ok(perturbed::table(results)),
-            _ => Err(CompareError::WrongExperiment),
+            _ => Err(ExperimentError::WrongExperiment),
         }
     }
 
@@ -358,30 +339,6 @@ impl CompareAnswer {
         match self {
             Self::Timed(results) => results.plots(),
             Self::Untimed(results) => perturbed::plots(results),
-        }
-    }
-}
-
-impl CompareError {
-    fn other(error: &compare::ResultsError) -> Self {
-        Self::Other(error.to_string())
-    }
-}
-
-impl From<ExperimentError> for CompareError {
-    fn from(error: ExperimentError) -> Self {
-        match error {
-            ExperimentError::Text(diagnostics) => Self::Text(diagnostics),
-            ExperimentError::Other(message) => Self::Other(message),
-        }
-    }
-}
-
-impl From<PerturbedError> for CompareError {
-    fn from(error: PerturbedError) -> Self {
-        match error {
-            PerturbedError::Text(diagnostics) => Self::Text(diagnostics),
-            PerturbedError::Other(message) => Self::Other(message),
         }
     }
 }

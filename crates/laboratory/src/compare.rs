@@ -12,7 +12,7 @@ mod failures;
 mod initial_plans;
 mod optimum;
 pub(crate) mod parts;
-mod plots;
+pub(crate) mod plots;
 mod results;
 mod scenario;
 mod trials;
@@ -22,15 +22,16 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use elbowroom_num::work;
 use rayon::prelude::*;
 
-pub use experiment::{Column, Experiment, ExperimentError, LinkedParameters, Planning, Published};
+pub use experiment::{Column, Experiment, LinkedParameters, Planning, Published};
 pub use failures::{Failure, Failures, TrialId};
 pub use initial_plans::FirstPlanNote;
 pub use optimum::ColumnOptimum;
-pub use results::{Cell, DiscordantTrials, Invalid, Results, ResultsError};
+pub use results::{Cell, DiscordantTrials, Invalid, Results};
 
 use parts::Partial;
 use trials::Setting;
 
+use crate::error::ExperimentError;
 use crate::record::TrialRecords;
 
 /// Trials to run, and the number of threads.
@@ -50,6 +51,16 @@ impl Part {
     /// Returns the numbers of the trials.
     pub(crate) fn numbers(self) -> impl Iterator<Item = u64> {
         (0..self.trials).filter(move |trial| trial % self.shards.max(1) == self.shard)
+    }
+
+    /// Creates the threads of the trials.
+    pub(crate) fn thread_pool(self) -> Result<rayon::ThreadPool, ExperimentError> {
+        let stop = work::Stop::current();
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(self.jobs)
+            .start_handler(move |_| stop.iter().for_each(work::Stop::install_for_thread))
+            .build()
+            .map_err(|error| ExperimentError::other(format!("cannot start threads: {error}")))
     }
 
     /// Returns the number of trials of an experiment, over all problems and columns.
@@ -113,12 +124,7 @@ pub fn run_recorded(
     records: Option<&TrialRecords>,
     observe: &(dyn Fn(u64) -> bool + Sync),
 ) -> Result<Results, ExperimentError> {
-    let stop = work::Stop::current();
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(part.jobs)
-        .start_handler(move |_| stop.iter().for_each(work::Stop::install_for_thread))
-        .build()
-        .map_err(|error| ExperimentError::other(format!("cannot start threads: {error}")))?;
+    let pool = part.thread_pool()?;
     let fillings = experiment.fillings();
     // Trials of one problem share data, so they run one after the other unless there are more
     // threads than problems. Results are sums, and do not depend on the order.

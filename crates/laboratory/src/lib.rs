@@ -6,6 +6,7 @@
 //! of an experiment from several machines add up.
 //!
 //! - [`answer`]: an experiment of either kind as one request with one answer.
+//! - [`error`]: errors of both kinds.
 //! - [`compare`]: temporal execution (`docs/experiments.md`).
 //! - [`perturbed`]: worlds without time, in which starts and effects fail and facts change
 //!   spontaneously (`docs/perturbed-worlds.md`); the experiments of paper 2.
@@ -26,6 +27,7 @@
 
 pub mod answer;
 pub mod compare;
+pub mod error;
 pub mod perturbed;
 pub mod record;
 pub mod untimed;

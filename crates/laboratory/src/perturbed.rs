@@ -30,14 +30,13 @@ use elbowroom_probability::Likelihoods;
 use elbowroom_probability::optimum::{self, DeadEnds};
 use rayon::prelude::*;
 
-pub use experiment::{
-    Case, OptimumRules, PerturbedError, PerturbedExperiment, PlannerKind, Published, WorldKind,
-};
+pub use experiment::{Case, OptimumRules, PerturbedExperiment, PlannerKind, Published, WorldKind};
 pub use results::{PerturbedResults, Row, Work};
 pub use stored_trial::{StoredPlan, StoredStep, StoredTrial};
 pub use table::{plots, records, table};
 
 use crate::compare::Part;
+use crate::error::ExperimentError;
 use crate::record::{TrialRecord, TrialRecords};
 use planner::EmbeddedPlans;
 
@@ -63,7 +62,7 @@ struct Setting<'e> {
     chances: EventProbabilities,
     perturbed: Option<PerturbedFacts>,
     foresight: OnceLock<Result<LookaheadPolicy, NotTabulated>>,
-    other_optima: OnceLock<Result<BTreeMap<OptimumRules, f64>, PerturbedError>>,
+    other_optima: OnceLock<Result<BTreeMap<OptimumRules, f64>, ExperimentError>>,
     has_first_plan: OnceLock<bool>,
 }
 
@@ -77,7 +76,7 @@ pub fn run(
     experiment: &PerturbedExperiment,
     part: Part,
     observe: &(dyn Fn(u64) -> bool + Sync),
-) -> Result<PerturbedResults, PerturbedError> {
+) -> Result<PerturbedResults, ExperimentError> {
     run_recorded(experiment, part, None, observe)
 }
 
@@ -90,7 +89,7 @@ pub fn run_recorded(
     part: Part,
     records: Option<&TrialRecords>,
     observe: &(dyn Fn(u64) -> bool + Sync),
-) -> Result<PerturbedResults, PerturbedError> {
+) -> Result<PerturbedResults, ExperimentError> {
     let done = AtomicU64::new(0);
     let watch = TrialCallbacks {
         may_continue: &|| observe(done.load(Ordering::Relaxed)),
@@ -105,12 +104,7 @@ pub fn run_recorded(
     let rows: Vec<_> = rows(experiment)
         .map(|(case, world, executor)| (&settings[case], (world, executor)))
         .collect();
-    let stop = work::Stop::current();
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(part.jobs)
-        .start_handler(move |_| stop.iter().for_each(work::Stop::install_for_thread))
-        .build()
-        .map_err(|error| PerturbedError::other(format!("cannot start threads: {error}")))?;
+    let pool = part.thread_pool()?;
     let rows: Result<Vec<Row>, _> = pool.install(|| {
         rows.par_iter()
             .map(|(setting, row)| setting.row(*row, part.numbers(), &watch, None))
@@ -146,7 +140,7 @@ fn rows(
 pub fn repeat_trials(
     experiment: &PerturbedExperiment,
     trials: &[(usize, u64)],
-) -> Result<Vec<String>, PerturbedError> {
+) -> Result<Vec<String>, ExperimentError> {
     let rows: Vec<_> = rows(experiment).collect();
     let watch = TrialCallbacks {
         may_continue: &|| true,
@@ -159,7 +153,7 @@ pub fn repeat_trials(
     for &(row, trial) in trials {
         let &(case, world, executor) = rows
             .get(row)
-            .ok_or_else(|| PerturbedError::other("unknown row"))?;
+            .ok_or_else(|| ExperimentError::other("unknown row"))?;
         let setting = match settings.entry(case) {
             Entry::Occupied(entry) => entry.into_mut(),
             Entry::Vacant(entry) => entry.insert(Setting::new(experiment, case)?),
@@ -173,14 +167,14 @@ pub fn repeat_trials(
 }
 
 impl<'e> Setting<'e> {
-    fn new(experiment: &'e PerturbedExperiment, number: usize) -> Result<Self, PerturbedError> {
+    fn new(experiment: &'e PerturbedExperiment, number: usize) -> Result<Self, ExperimentError> {
         let case = &experiment.cases[number];
         let domain = Source::new("domain", case.domain.as_str());
         let problem = Source::new("problem", case.problem.as_str());
-        let (problem, _) = read_problem(&domain, &problem).map_err(PerturbedError::Text)?;
+        let (problem, _) = read_problem(&domain, &problem).map_err(ExperimentError::Text)?;
         let task = Task::new(problem);
         let wrong = |error: &dyn std::fmt::Display| {
-            PerturbedError::other(format!("{}: {error}", case.name))
+            ExperimentError::other(format!("{}: {error}", case.name))
         };
         let likelihoods = elbowroom_probability::likelihoods::read(
             Source::new(
@@ -189,7 +183,7 @@ impl<'e> Setting<'e> {
             ),
             &task,
         )
-        .map_err(PerturbedError::Text)?;
+        .map_err(ExperimentError::Text)?;
         if likelihoods.has_rates() {
             return Err(wrong(
                 &"the likelihoods have rates per second, but a perturbed world has only steps: use \
@@ -240,7 +234,7 @@ impl<'e> Setting<'e> {
     }
 
     /// Returns the optima by the other rules that the experiment requests.
-    fn other_optima(&self) -> &Result<BTreeMap<OptimumRules, f64>, PerturbedError> {
+    fn other_optima(&self) -> &Result<BTreeMap<OptimumRules, f64>, ExperimentError> {
         self.other_optima.get_or_init(|| {
             let rules = self.case.also.iter().map(|&rules| {
                 let settings = optimum::Settings {
@@ -278,17 +272,17 @@ impl<'e> Setting<'e> {
         DeadEnds::Patience(self.experiment.rounds.saturating_sub(1).max(1))
     }
 
-    fn lookahead_policy(&self) -> Result<&LookaheadPolicy, PerturbedError> {
+    fn lookahead_policy(&self) -> Result<&LookaheadPolicy, ExperimentError> {
         self.table()
             .as_ref()
             .map_err(|error| self.missing_table_error(error))
     }
 
-    fn missing_table_error(&self, error: &NotTabulated) -> PerturbedError {
-        PerturbedError::other(format!("{}: {error}", self.case.name))
+    fn missing_table_error(&self, error: &NotTabulated) -> ExperimentError {
+        ExperimentError::other(format!("{}: {error}", self.case.name))
     }
 
-    fn executor(&self, name: ExecutorName) -> Result<Box<dyn UntimedExecutor>, PerturbedError> {
+    fn executor(&self, name: ExecutorName) -> Result<Box<dyn UntimedExecutor>, ExperimentError> {
         let foresight = || self.table().clone();
         let executor = name.build(&ExecutorServices {
             task: Arc::clone(&self.task),
@@ -366,7 +360,7 @@ impl<'e> Setting<'e> {
         numbers: impl Iterator<Item = u64>,
         watch: &TrialCallbacks<'_>,
         course: Option<&mut StepRecord>,
-    ) -> Result<Row, PerturbedError> {
+    ) -> Result<Row, ExperimentError> {
         if !(watch.may_continue)() {
             return Ok(Row::new(self.case, world, kind, None));
         }

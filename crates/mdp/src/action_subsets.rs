@@ -4,9 +4,9 @@
 use elbowroom_model::Task;
 use elbowroom_sim::WorldModel;
 
-use super::process::action_model::ActionModel;
-use super::process::world::{Facts, TimedWorld};
-use super::{NotTabulated, Settings};
+use super::process::action_model::{ActionModel, Facts};
+use super::process::world::TimedWorld;
+use super::settings::{NotTabulated, Settings};
 
 /// Returns `actions` with as few of `others` as possible, such that all actions stay reachable from
 /// the initial state that are reachable with all `others`. Reachability is relaxed: no fact becomes

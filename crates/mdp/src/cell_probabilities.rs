@@ -2,10 +2,9 @@
 
 use elbowroom_sim::{Side as Part, rounding_edge};
 
-use super::process::action_model::{ActionModel, Occurs};
-use super::process::failures::Ending;
+use super::process::action_model::{ActionModel, Ending, Occurs};
 use super::process::world::{TimedWorld, unknown_shape};
-use super::{NotTabulated, Side};
+use super::settings::{NotTabulated, Side};
 
 /// Conditional probabilities of happenings in a cell, given that they have not taken place before.
 #[derive(Debug)]
@@ -68,6 +67,28 @@ impl EndProbabilities {
 
 /// Maximum number of parts of a duration that are distinguished for the time of a failure.
 const MOST_SHARES: f64 = 10_000.0;
+
+/// Returns the length of a cell, in seconds.
+pub(crate) fn step(world: &TimedWorld, cells: usize) -> f64 {
+    #[allow(clippy::cast_precision_loss, reason = "at most 65,535")]
+    let cells = cells as f64;
+    world.horizon / cells
+}
+
+/// Returns the probabilities of happenings in each of `cells` cells, for a bound; `cells` is below
+/// 65,534.
+///
+/// # Errors
+/// When a distribution has no known probabilities.
+pub fn cell_probabilities_of(
+    world: &TimedWorld,
+    cells: usize,
+    side: Side,
+) -> Result<CellProbabilities, NotTabulated> {
+    // In the upper bound, a happening at the horizon belongs to a further cell.
+    let all = cells + usize::from(side == Side::Above);
+    CellProbabilities::new(world, step(world, cells), all, side)
+}
 
 impl CellProbabilities {
     /// Computes the probabilities on a grid. Cells are closed at the left for an upper bound, and

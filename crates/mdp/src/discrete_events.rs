@@ -20,11 +20,11 @@ mod search;
 
 use elbowroom_sim::Distribution;
 
-use super::Side;
 use super::cell_probabilities::{CellProbabilities, NEVER};
-use super::process::action_model::Occurs;
-use super::process::world::{Facts, TimedWorld};
+use super::process::action_model::{Facts, Occurs};
+use super::process::world::TimedWorld;
 use super::restricted_policy::constant;
+use super::settings::Side;
 use super::state::{Phase, State};
 
 pub(super) use search::{Effort, RestrictedAgent, bounds};

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use elbowroom_num::work;
 use indexmap::IndexSet;
 
-use super::Stop;
+use super::settings::Stop;
 use super::state::{ReachabilityCache, State};
 
 /// A target of a transition.

@@ -11,7 +11,7 @@
 //! its planner.
 //!
 //! **Numbers.** For a number that actions change, the state contains an interval of its values
-//! (`process::value_intervals`). A comparison is an additional fact. In the upper bound it holds if some of the
+//! (`process::numbers`). A comparison is an additional fact. In the upper bound it holds if some of the
 //! values satisfy it, in the lower bound if all do. Drawn values are divided into intervals where
 //! they decide a comparison.
 //!
@@ -55,124 +55,26 @@ mod lower_bound;
 mod policy;
 pub mod process;
 mod projection;
+mod refinement;
 mod relaxed_world;
 mod restricted_policy;
+mod settings;
 mod state;
 mod upper_bound;
 
 use elbowroom_model::Task;
-use elbowroom_num::Rational;
 use elbowroom_sim::WorldModel;
-use serde::{Deserialize, Serialize};
 
 pub use action_subsets::supported;
-pub use cell_probabilities::{CellProbabilities, EndProbabilities};
+pub use cell_probabilities::{CellProbabilities, EndProbabilities, cell_probabilities_of};
 pub use policy::Policy;
+pub use refinement::TimedOptimum;
 pub use restricted_policy::RestrictedPolicy;
+pub use settings::{Grid, NotTabulated, Settings, Side, Stop};
 
 use process::world::TimedWorld;
-
-/// Limits of the computation.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Settings {
-    /// The difference of the bounds at which the computation stops.
-    pub gap: f64,
-    /// Maximum number of states of a grid, all cells together.
-    pub most_states: usize,
-    /// Number of cells of the first grid.
-    pub first_cells: usize,
-    /// Latest end of a run; `None` for the time of the last event.
-    pub horizon: Option<Rational>,
-    /// The available actions, `(name object …)`; `None` for all.
-    pub only: Option<Vec<String>>,
-    /// Sets of actions, such as those of plans. An agent that uses only one of these sets is no
-    /// better than the best, but its bound needs fewer states.
-    pub plans: Vec<Vec<String>>,
-    /// Further sets of actions: those of new plans after a failure of one of the
-    /// [plans](Self::plans), with the supporting actions of that plan ([`supported`]). They are
-    /// used only if everything happens at known times, after the plans.
-    pub fallbacks: Vec<Vec<String>>,
-}
-
-impl Default for Settings {
-    /// A difference of one percentage point; some seconds.
-    fn default() -> Self {
-        Self {
-            gap: 0.01,
-            most_states: 2_000_000,
-            first_cells: 32,
-            horizon: None,
-            only: None,
-            plans: Vec::new(),
-            fallbacks: Vec::new(),
-        }
-    }
-}
-
-/// Reasons for the end of the refinement.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Stop {
-    /// The bounds are close enough.
-    Close,
-    /// The next grid has too many states.
-    TooManyStates,
-    /// The caller stopped it.
-    Interrupted,
-}
-
-/// Bounds on the success probability of the best executor.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct TimedOptimum {
-    /// The lower bound.
-    pub lower: f64,
-    /// The upper bound.
-    pub upper: f64,
-    /// The finished grids, coarse ones first.
-    pub grids: Vec<Grid>,
-    /// Reason for the end of the refinement.
-    pub stop: Stop,
-    /// The set of actions behind the lower bound; `None` if the lower bound is that of the finest
-    /// grid.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub within: Option<RestrictedPolicy>,
-}
-
-/// The bounds of one grid.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Grid {
-    /// The length of a cell, in seconds.
-    pub step: f64,
-    /// The lower bound.
-    pub lower: f64,
-    /// The upper bound.
-    pub upper: f64,
-    /// Number of states at the beginnings of cells, for both bounds together.
-    pub states: usize,
-}
-
-/// Direction of a bound on the best value.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Side {
-    /// A lower bound.
-    Below,
-    /// An upper bound.
-    Above,
-}
-
-/// The task or the world has features without a timed optimum.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{what}; the optimum without foresight does not support this")]
-pub struct NotTabulated {
-    /// The unsupported feature.
-    pub what: String,
-}
-
-impl NotTabulated {
-    fn new(what: impl Into<String>) -> Self {
-        Self { what: what.into() }
-    }
-}
+use refinement::refine_bounds;
+use restricted_policy::FIRST_STATES_DIVISOR;
 
 /// Bounds the success probability of the best executor without foresight.
 ///
@@ -255,134 +157,4 @@ pub fn has_known_times(task: &Task, model: &WorldModel) -> bool {
 /// Returns `true` if the process supports all features of the task and of the world.
 pub fn is_supported(task: &Task, model: &WorldModel, settings: &Settings) -> bool {
     TimedWorld::new(task, model, settings).is_ok()
-}
-
-/// The lower bounds from sets of actions first get the maximum number of states divided by this,
-/// before the whole process is examined.
-const FIRST_STATES_DIVISOR: usize = 16;
-
-impl TimedOptimum {
-    /// Returns the trivial bounds.
-    fn unknown() -> Self {
-        Self {
-            lower: 0.0,
-            upper: 1.0,
-            grids: Vec::new(),
-            stop: Stop::Close,
-            within: None,
-        }
-    }
-}
-
-/// Improves the bounds `known` on finer and finer grids. `is_promising` is called after each grid
-/// to decide whether the refinement continues.
-fn refine_bounds(
-    world: &TimedWorld,
-    known: TimedOptimum,
-    settings: &Settings,
-    is_promising: &dyn Fn(&[Grid]) -> bool,
-    goes_on: &dyn Fn() -> bool,
-) -> Result<TimedOptimum, NotTabulated> {
-    let mut answer = known;
-    let mut cells = settings.first_cells.max(1);
-    loop {
-        match grid(world, cells, settings, goes_on)? {
-            Ok(grid) => {
-                answer.lower = answer.lower.max(grid.lower);
-                answer.upper = answer.upper.min(grid.upper);
-                answer.grids.push(grid);
-            }
-            Err(stop) => {
-                answer.stop = stop;
-                return Ok(answer);
-            }
-        }
-        if answer.upper - answer.lower <= settings.gap {
-            return Ok(answer);
-        }
-        if !is_promising(&answer.grids) {
-            answer.stop = Stop::TooManyStates;
-            return Ok(answer);
-        }
-        cells *= 2;
-    }
-}
-
-/// Widening of the bounds, far above rounding errors.
-const ROUNDING_MARGIN: f64 = 1e-9;
-
-/// Returns the length of a cell, in seconds.
-fn step(world: &TimedWorld, cells: usize) -> f64 {
-    #[allow(clippy::cast_precision_loss, reason = "at most 65,535")]
-    let cells = cells as f64;
-    world.horizon / cells
-}
-
-/// Returns the probabilities of happenings in each of `cells` cells, for a bound; `cells` is below
-/// 65,534.
-///
-/// # Errors
-/// When a distribution has no known probabilities.
-pub fn cell_probabilities_of(
-    world: &TimedWorld,
-    cells: usize,
-    side: Side,
-) -> Result<CellProbabilities, NotTabulated> {
-    // In the upper bound, a happening at the horizon belongs to a further cell.
-    let all = cells + usize::from(side == Side::Above);
-    CellProbabilities::new(world, step(world, cells), all, side)
-}
-
-fn grid(
-    world: &TimedWorld,
-    cells: usize,
-    settings: &Settings,
-    goes_on: &dyn Fn() -> bool,
-) -> Result<Result<Grid, Stop>, NotTabulated> {
-    if cells >= usize::from(u16::MAX) {
-        return Ok(Err(Stop::TooManyStates));
-    }
-    let mut left = settings.most_states;
-    // The lower bound first, because it detects sooner that there are too many states.
-    let lower = match bound(world, (cells, Side::Below), &mut left, goes_on)? {
-        Ok(value) => value,
-        Err(why) => return Ok(Err(why)),
-    };
-    let upper = match bound(world, (cells, Side::Above), &mut left, goes_on)? {
-        Ok(value) => value,
-        Err(why) => return Ok(Err(why)),
-    };
-    Ok(Ok(Grid {
-        step: step(world, cells),
-        lower,
-        upper,
-        states: settings.most_states - left,
-    }))
-}
-
-/// Computes a bound on one grid. `left` is the remaining number of states.
-fn bound(
-    world: &TimedWorld,
-    (cells, side): (usize, Side),
-    left: &mut usize,
-    goes_on: &dyn Fn() -> bool,
-) -> Result<Result<f64, Stop>, NotTabulated> {
-    let chances = cell_probabilities_of(world, cells, side)?;
-    let world = &world.for_bound(side);
-    Ok(match side {
-        Side::Above => {
-            let value = graph::value(
-                &upper_bound::UpperBound::new(world, &chances),
-                left,
-                goes_on,
-            );
-            value.map(|value| (value + ROUNDING_MARGIN).min(1.0))
-        }
-        Side::Below => {
-            let below =
-                lower_bound::LowerBound::new(world, &chances, lower_bound::DecisionEpochs::Always);
-            let value = graph::value(&below, left, goes_on);
-            value.map(|value| (value - ROUNDING_MARGIN).max(0.0))
-        }
-    })
 }

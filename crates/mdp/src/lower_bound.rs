@@ -5,10 +5,10 @@ use indexmap::IndexSet;
 
 use super::cell_probabilities::CellProbabilities;
 use super::graph::{Choice, Expansion, Layers, Limits, MOST_WAYS, Nodes, Target};
-use super::process::failures::Ending;
+use super::process::action_model::Ending;
 use super::process::world::TimedWorld;
+use super::settings::{Side, Stop};
 use super::state::{Phase, ReachabilityCache, State};
-use super::{Side, Stop};
 
 /// Maximum number of happenings in one cell; beyond it, the state counts as lost.
 const MOST_ORDERED: usize = 5;

@@ -8,17 +8,17 @@ use elbowroom_num::Rational;
 use elbowroom_sim::{Side as Part, WorldModel};
 use indexmap::{IndexMap, IndexSet};
 
-use super::cell_probabilities::CellProbabilities;
+use super::cell_probabilities::{CellProbabilities, cell_probabilities_of};
+use super::discrete_events;
 use super::graph::{Discounts, Expansion, Layers, Limits, Values, backward_induction, solve_cell};
 use super::lower_bound::{DecisionEpochs, LowerBound, Move};
+use super::process::action_model::Facts;
 use super::process::value_intervals::Span;
-use super::process::world::{Facts, TimedWorld};
-use super::restricted_policy::Search;
+use super::process::world::TimedWorld;
+use super::refinement::{TimedOptimum, grid, refine_bounds};
+use super::restricted_policy::{FIRST_STATES_DIVISOR, Search};
+use super::settings::{Grid, NotTabulated, Settings, Side};
 use super::state::{Phase, ReachabilityCache, Running, State};
-use super::{
-    FIRST_STATES_DIVISOR, Grid, NotTabulated, Settings, Side, TimedOptimum, discrete_events, grid,
-    refine_bounds,
-};
 
 /// Table of the values of all states on the grid of the lower bound, for evaluating each move.
 ///
@@ -171,7 +171,7 @@ impl Policy {
             world,
             epochs: manner,
         } = within;
-        let chances = super::cell_probabilities_of(&world, found.cells, Side::Below)?;
+        let chances = cell_probabilities_of(&world, found.cells, Side::Below)?;
         let step = exact_step(&world, found.cells);
         let optimum = TimedOptimum {
             lower: found.grid.lower,

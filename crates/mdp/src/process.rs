@@ -3,10 +3,10 @@
 pub(crate) mod action_model;
 mod applicable;
 mod compile;
-pub(crate) mod failures;
+mod failures;
+mod numbers;
 pub(crate) mod value_intervals;
 pub(crate) mod world;
 
-pub use action_model::{ActionModel, Event, Needs, Snap};
-pub use failures::FailureKind;
-pub use world::{Facts, TimedWorld};
+pub use action_model::{ActionModel, Event, Facts, FailureKind, Needs, Snap};
+pub use world::TimedWorld;

@@ -5,10 +5,10 @@
 //! read only by conditions at starts and ends. It is added only by starts, and by certain ends of
 //! actions that delete only such facts. Without it, the earliest time of the goal is the same.
 
-use super::Side;
 use super::cell_probabilities::CellProbabilities;
-use super::process::action_model::{ActionModel, Event};
-use super::process::world::{Facts, TimedWorld};
+use super::process::action_model::{ActionModel, Event, Facts};
+use super::process::world::TimedWorld;
+use super::settings::Side;
 use super::state::State;
 
 impl TimedWorld {

@@ -4,7 +4,8 @@ use elbowroom_sim::Distribution;
 
 use super::process::action_model::{Event, Occurs};
 use super::process::world::TimedWorld;
-use super::{NotTabulated, Settings, Side, bound};
+use super::refinement::bound;
+use super::settings::{NotTabulated, Settings, Side};
 
 impl TimedWorld {
     /// Returns the world without uncertain events that only make facts false. `None` if there are

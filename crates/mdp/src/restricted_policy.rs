@@ -13,9 +13,11 @@ use elbowroom_sim::{Distribution, WorldModel};
 use serde::{Deserialize, Serialize};
 
 use super::cell_probabilities::CellProbabilities;
+use super::graph;
 use super::lower_bound::{DecisionEpochs, LowerBound};
 use super::process::action_model::Occurs;
-use super::{ROUNDING_MARGIN, Settings, Side, TimedWorld, graph};
+use super::process::world::TimedWorld;
+use super::settings::{ROUNDING_MARGIN, Settings, Side};
 
 /// A lower bound from a set of actions, each started after a happening.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -29,6 +31,10 @@ pub struct RestrictedPolicy {
     /// The actions, `(name object …)`.
     pub actions: Vec<String>,
 }
+
+/// The lower bounds from sets of actions first get the maximum number of states divided by this,
+/// before the whole process is examined.
+pub(super) const FIRST_STATES_DIVISOR: usize = 16;
 
 /// Search for bounds from several sets of actions.
 pub(super) struct Search {

@@ -2,11 +2,10 @@
 
 use indexmap::IndexMap;
 
-use super::Side;
-use super::process::action_model::Snap;
-use super::process::failures::Ending;
+use super::process::action_model::{Ending, Facts, Snap};
 use super::process::value_intervals::Span;
-use super::process::world::{Facts, TimedWorld};
+use super::process::world::TimedWorld;
+use super::settings::Side;
 
 /// Cache of reachability checks of the goal.
 pub(super) type ReachabilityCache = IndexMap<(Facts, u64, u32), bool>;

@@ -7,10 +7,10 @@ mod relaxed_ends;
 
 use indexmap::IndexSet;
 
-use super::Stop;
 use super::cell_probabilities::CellProbabilities;
 use super::graph::{Choice, Expansion, Layers, Limits, MOST_WAYS, Nodes, Target};
 use super::process::world::TimedWorld;
+use super::settings::Stop;
 use super::state::{Phase, ReachabilityCache, State};
 use relaxed_ends::{EndClasses, WaitingCache};
 

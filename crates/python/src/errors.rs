@@ -9,7 +9,7 @@ use elbowroom::execute::SpecError;
 use elbowroom::num::Rational;
 use elbowroom::text::Diagnostics;
 use elbowroom_executive::run::RunError;
-use elbowroom_laboratory::answer::CompareError;
+use elbowroom_laboratory::error::ExperimentError;
 use pyo3::prelude::*;
 
 /// Reason why there is no answer.
@@ -94,10 +94,10 @@ impl From<RunError> for CallError {
     }
 }
 
-impl From<CompareError> for CallError {
-    fn from(error: CompareError) -> Self {
+impl From<ExperimentError> for CallError {
+    fn from(error: ExperimentError) -> Self {
         match error {
-            CompareError::Text(diagnostics) => Self::Read(diagnostics),
+            ExperimentError::Text(diagnostics) => Self::Read(diagnostics),
             other => Self::request(other),
         }
     }

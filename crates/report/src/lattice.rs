@@ -7,6 +7,8 @@
 
 use std::fmt::Write as _;
 
+use crate::svg::{self, escaped, float, text};
+
 /// The picture of a lattice.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LatticePicture {
@@ -70,13 +72,7 @@ impl LatticePicture {
         let width = (2.0 * MARGIN + COLUMN * float(levels)).max(640.0);
         let steps = float(self.steps().count());
         let height = HEAD + 1.5 * MARGIN + ROW * float(tallest.max(3)) + LINE * steps;
-        let mut svg = String::new();
-        let _ = writeln!(
-            svg,
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width:.0}\" height=\"{height:.0}\" \
-             viewBox=\"0 0 {width:.0} {height:.0}\" font-family=\"sans-serif\">"
-        );
-        let _ = writeln!(svg, "<rect width=\"100%\" height=\"100%\" fill=\"white\"/>");
+        let mut svg = svg::begin(width, height);
         text(&mut svg, (MARGIN / 2.0, 26.0), 16, "start", &self.title);
         text(&mut svg, (MARGIN / 2.0, 46.0), 12, "start", &self.subtitle);
         for edge in self.edges.iter().filter(|edge| !self.is_shown(edge)) {
@@ -197,15 +193,6 @@ impl LatticePicture {
     }
 }
 
-fn text(svg: &mut String, (x, y): (f64, f64), size: u32, anchor: &str, words: &str) {
-    let _ = writeln!(
-        svg,
-        "<text x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{size}\" text-anchor=\"{anchor}\" \
-         fill=\"#3c3c3c\">{}</text>",
-        escaped(words)
-    );
-}
-
 /// Returns a colour between white and the blue of Okabe & Ito.
 fn blue(share: f64) -> String {
     let share = share.clamp(0.0, 1.0);
@@ -220,25 +207,6 @@ fn blue(share: f64) -> String {
 
 fn percent(value: f64) -> String {
     format!("{:.1} %", 100.0 * value)
-}
-
-pub(crate) fn escaped(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for character in text.chars() {
-        match character {
-            '&' => escaped.push_str("&amp;"),
-            '<' => escaped.push_str("&lt;"),
-            '>' => escaped.push_str("&gt;"),
-            '"' => escaped.push_str("&quot;"),
-            other => escaped.push(other),
-        }
-    }
-    escaped
-}
-
-#[allow(clippy::cast_precision_loss, reason = "counts of drawn elements")]
-fn float(count: usize) -> f64 {
-    count as f64
 }
 
 #[cfg(test)]

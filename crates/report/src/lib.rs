@@ -8,7 +8,7 @@
 //! - [`exact`]: exact numbers in JSON.
 //! - [`statistics`]: proportions with Wilson's intervals, means.
 //! - [`table`]: tables as Markdown, CSV, or text for a terminal.
-//! - [`plot`]: what plots show, and, with the feature `plots`, plots as SVG.
+//! - [`plot`]: plots of values with intervals, as SVG.
 //! - [`console`]: texts for consoles, with the table of tolerances.
 //! - [`decimal`]: exact numbers as decimals.
 //! - [`lattice`]: a picture of the orders of a plan, as SVG.
@@ -35,6 +35,7 @@ pub mod plane;
 pub mod plot;
 pub mod schema;
 pub mod statistics;
+mod svg;
 pub mod table;
 pub mod trace;
 pub mod validation;

@@ -4,6 +4,8 @@
 
 use std::fmt::Write as _;
 
+use crate::svg::{self, INK, escaped, number, text, ticks};
+
 /// The picture of a plane.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PlanePicture {
@@ -32,7 +34,6 @@ const TOP_MARGIN: f64 = 70.0;
 /// Width of the legend.
 const LEGEND_WIDTH: f64 = 210.0;
 const BOTTOM_MARGIN: f64 = 60.0;
-const INK: &str = "#3c3c3c";
 /// Colours of Okabe & Ito, which colour-blind readers can distinguish, each with its own dash
 /// pattern.
 const LEGEND_ENTRIES: [(&str, &str); 4] = [
@@ -41,9 +42,6 @@ const LEGEND_ENTRIES: [(&str, &str); 4] = [
     ("#cc79a7", "3 3"),
     ("#e69f00", "10 3 2 3"),
 ];
-/// Approximate number of ticks on an axis.
-const TICKS: f64 = 6.0;
-
 impl PlanePicture {
     /// Renders the picture as an SVG document.
     pub fn svg(&self) -> String {
@@ -51,13 +49,7 @@ impl PlanePicture {
             LEFT_MARGIN + SIDE + LEGEND_WIDTH,
             TOP_MARGIN + SIDE + BOTTOM_MARGIN,
         );
-        let mut svg = String::new();
-        let _ = writeln!(
-            svg,
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width:.0}\" height=\"{height:.0}\" \
-             viewBox=\"0 0 {width:.0} {height:.0}\" font-family=\"sans-serif\">"
-        );
-        let _ = writeln!(svg, "<rect width=\"100%\" height=\"100%\" fill=\"white\"/>");
+        let mut svg = svg::begin(width, height);
         text(&mut svg, (12.0, 26.0), 16, "start", &self.title);
         text(&mut svg, (12.0, 46.0), 12, "start", &self.subtitle);
         self.ticks(&mut svg);
@@ -198,33 +190,6 @@ impl PlanePicture {
     }
 }
 
-/// Returns round numbers between the ends.
-fn ticks(from: f64, to: f64) -> Vec<f64> {
-    let span = to - from;
-    if span.is_nan() || span <= 0.0 || span.is_infinite() {
-        return Vec::new();
-    }
-    let rough = span / TICKS;
-    let power = 10_f64.powf(rough.log10().floor());
-    let factors = [1.0, 2.0, 5.0, 10.0];
-    let fits = factors.iter().find(|factor| *factor * power >= rough);
-    let step = fits.unwrap_or(&10.0) * power;
-    let first = (from / step).ceil();
-    let mut ticks = Vec::new();
-    let mut count = 0.0;
-    while (first + count) * step <= to && count < 2.0 * TICKS + 2.0 {
-        ticks.push((first + count) * step);
-        count += 1.0;
-    }
-    ticks
-}
-
-fn number(value: f64) -> String {
-    let text = format!("{value:.6}");
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" { "0" } else { text }.to_owned()
-}
-
 fn cross(svg: &mut String, (x, y): (f64, f64)) {
     let _ = writeln!(
         svg,
@@ -244,29 +209,9 @@ fn legend(svg: &mut String, y: f64, words: &str) {
     );
 }
 
-fn text(svg: &mut String, (x, y): (f64, f64), size: u32, anchor: &str, words: &str) {
-    let _ = writeln!(
-        svg,
-        "<text x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{size}\" text-anchor=\"{anchor}\" \
-         fill=\"{INK}\">{}</text>",
-        escaped(words)
-    );
-}
-
-fn escaped(text: &str) -> String {
-    crate::lattice::escaped(text)
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{PlanePicture, ticks};
-
-    #[test]
-    fn ticks_are_round_and_inside() {
-        assert_eq!(ticks(0.3, 6.1), [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
-        assert_eq!(ticks(-40.0, 40.0), [-40.0, -20.0, 0.0, 20.0, 40.0]);
-        assert!(ticks(1.0, 1.0).is_empty() && ticks(0.0, f64::INFINITY).is_empty());
-    }
+    use super::PlanePicture;
 
     #[test]
     fn shapes_outside_window_are_not_drawn() {

@@ -7,9 +7,10 @@ use std::{fs, io};
 use elbowroom::answers::{Event, Observer, StopRequest};
 use elbowroom::report::table::Table;
 use elbowroom_laboratory::answer::{
-    AnyExperiment, CompareAnswer, CompareError, CompareRequest, FailurePosition, compare_recorded,
+    AnyExperiment, CompareAnswer, CompareRequest, FailurePosition, compare_recorded,
 };
 use elbowroom_laboratory::compare::Part;
+use elbowroom_laboratory::error::ExperimentError;
 use elbowroom_laboratory::record::TrialRecords;
 
 use crate::args::CompareArgs;
@@ -141,7 +142,7 @@ fn merge_results(paths: &[PathBuf], experiment: &AnyExperiment) -> Result<Compar
     for path in paths {
         let text = input::source(path, "results")?;
         let part = CompareAnswer::read(text.text(), experiment).map_err(|error| match error {
-            CompareError::WrongExperiment => Failure::new(
+            ExperimentError::WrongExperiment => Failure::new(
                 format!("{} belongs to another experiment", path.display()),
                 "give results of parts of this experiment, computed from the same files",
             ),
@@ -166,8 +167,7 @@ fn write(
         write("trials.csv", &records.table().csv())?;
     }
     for (name, plot) in answer.plots() {
-        let svg = plot.svg().map_err(|error| Failure::new(error, ""))?;
-        write(&format!("{name}.svg"), &svg)?;
+        write(&format!("{name}.svg"), &plot.svg())?;
     }
     Ok(())
 }
@@ -243,10 +243,10 @@ fn make_folder(folder: &Path) -> Result<(), Failure> {
     })
 }
 
-impl From<CompareError> for Failure {
-    fn from(error: CompareError) -> Self {
+impl From<ExperimentError> for Failure {
+    fn from(error: ExperimentError) -> Self {
         match error {
-            CompareError::Text(diagnostics) => diagnostics.into(),
+            ExperimentError::Text(diagnostics) => diagnostics.into(),
             other => Self::new(other, ""),
         }
     }

@@ -32,7 +32,7 @@ fn temporary(name: &str) -> String {
 }
 
 #[test]
-fn parallel_actions_are_executed_in_parallel_and_as_the_plan_needs_it() {
+fn parallel_actions_overlap_as_the_plan_requires() {
     let outcome = json(&[&["run"], &MATCH[..], &["--json"]].concat());
     assert_eq!(outcome["verdict"], "goal-reached", "{outcome:#}");
     let spans = outcome["executed"]
@@ -99,7 +99,7 @@ fn parallel_actions_are_executed_in_parallel_and_as_the_plan_needs_it() {
 }
 
 #[test]
-fn who_never_answers_is_given_up_and_the_run_ends_with_that_reason() {
+fn silent_performer_times_out_and_the_run_reports_it() {
     let task = errands("(have book)");
     let mut world = Toy {
         fault: Some(|_| Fault::Silent),
@@ -146,7 +146,7 @@ fn who_never_answers_is_given_up_and_the_run_ends_with_that_reason() {
 }
 
 #[test]
-fn what_is_late_is_waited_for_as_long_as_the_plan_can_bear_and_then_given_up() {
+fn late_action_is_awaited_while_the_plan_tolerates_it() {
     let domain = "(define (domain late) (:requirements :durative-actions :timed-initial-literals)
         (:predicates (open) (there) (tried))
         (:durative-action walk :parameters () :duration (= ?duration 10)
@@ -223,7 +223,7 @@ fn what_is_late_is_waited_for_as_long_as_the_plan_can_bear_and_then_given_up() {
 }
 
 #[test]
-fn after_a_failure_there_is_a_new_plan_without_anybody_asking() {
+fn failure_causes_automatic_replanning() {
     let task = errands("(have book)");
     let mut world = Toy {
         fault: Some(|ticket| {
@@ -250,7 +250,7 @@ fn after_a_failure_there_is_a_new_plan_without_anybody_asking() {
 }
 
 #[test]
-fn a_run_that_cannot_go_on_stops_early_and_says_since_when_and_why() {
+fn hopeless_run_stops_early_with_time_and_reason() {
     let task = errands("(and (have book) (have cup))");
     let gone = |name: &str| {
         let fact = task.fact_named(name).expect("a correct test");
@@ -278,7 +278,7 @@ fn a_run_that_cannot_go_on_stops_early_and_says_since_when_and_why() {
 }
 
 #[test]
-fn a_pause_starts_nothing_and_a_stop_leaves_nothing_running() {
+fn pause_starts_nothing_and_stop_cancels_running_actions() {
     // With one robot, the errands are sequential.
     let problem = "(define (problem day) (:domain errands) (:objects r - robot book cup key - item)
         (:init (free r) (here book) (here cup) (here key))
@@ -387,7 +387,7 @@ fn a_pause_starts_nothing_and_a_stop_leaves_nothing_running() {
 }
 
 #[test]
-fn what_an_action_should_have_done_is_compared_with_what_is_seen() {
+fn expected_effects_are_compared_with_observations() {
     let task = errands("(have book)");
     let have = task.fact_named("(have book)").expect("a correct test");
     let mut world = Toy {
@@ -432,7 +432,7 @@ fn what_an_action_should_have_done_is_compared_with_what_is_seen() {
 }
 
 #[test]
-fn a_plan_and_its_progress_can_be_seen_in_time() {
+fn plan_and_progress_are_visible_during_the_run() {
     let trace = temporary("seen.jsonl");
     let page = temporary("seen.html");
     let done = elbowroom(&[&["run"], &DELIVERY[..], &["--trace", &trace]].concat());
@@ -470,7 +470,7 @@ fn a_plan_and_its_progress_can_be_seen_in_time() {
 }
 
 #[test]
-fn a_run_leaves_data_with_which_it_can_be_played_back() {
+fn recorded_run_can_be_replayed() {
     let trace = temporary("data.jsonl");
     let world = [
         "--world",
@@ -497,7 +497,7 @@ fn a_run_leaves_data_with_which_it_can_be_played_back() {
 }
 
 #[test]
-fn durations_and_failures_are_simulated_and_a_seed_makes_them_again() {
+fn simulated_durations_and_failures_are_reproducible_by_seed() {
     let run = |seed: &str| {
         let world = [
             "--world",
@@ -514,7 +514,7 @@ fn durations_and_failures_are_simulated_and_a_seed_makes_them_again() {
 }
 
 #[test]
-fn a_plan_is_relaxed_to_a_network_and_that_is_executed() {
+fn plan_is_deordered_to_a_network_and_executed() {
     let network = json(&[&["stn"], &DELIVERY[..], &[PLAN, "--json"]].concat());
     assert!(network.to_string().contains("(drive rover depot shelf)"));
     let outcome = json(
@@ -529,7 +529,7 @@ fn a_plan_is_relaxed_to_a_network_and_that_is_executed() {
 }
 
 #[test]
-fn numbers_durations_from_fluents_and_windows_are_planned_with_and_executed() {
+fn numeric_fluents_and_time_windows_are_planned_and_executed() {
     let domain = "(define (domain d) (:requirements :durative-actions :fluents
           :timed-initial-literals)
         (:predicates (open) (done))
@@ -548,7 +548,7 @@ fn numbers_durations_from_fluents_and_windows_are_planned_with_and_executed() {
 }
 
 #[test]
-fn a_planner_that_dies_is_not_taken_for_one_that_says_there_is_no_plan() {
+fn planner_crash_is_not_reported_as_no_plan() {
     let done = elbowroom(
         &[
             &["plan"],
@@ -592,7 +592,7 @@ fn a_planner_that_dies_is_not_taken_for_one_that_says_there_is_no_plan() {
 }
 
 #[test]
-fn the_judge_goes_by_the_epsilon_of_the_plan() {
+fn validator_uses_the_epsilon_of_the_plan() {
     let check = |options: &[&str]| {
         let done = elbowroom(&[&["check"], &DELIVERY[..], &[PLAN], options].concat());
         done.status.code()
@@ -622,7 +622,7 @@ fn the_judge_goes_by_the_epsilon_of_the_plan() {
 }
 
 #[test]
-fn two_robots_do_two_things_at_once_and_goals_come_while_they_do() {
+fn robots_act_concurrently_and_accept_goals_during_execution() {
     let task = errands("(have book)");
     let (name, goal) = ("cup".to_owned(), "(have cup)".to_owned());
     let mut world = Toy {
@@ -655,7 +655,7 @@ fn two_robots_do_two_things_at_once_and_goals_come_while_they_do() {
 
 /// Each row of the page names a test in this file, and each test has a row.
 #[test]
-fn the_page_has_a_row_for_each_test() {
+fn document_lists_every_test() {
     let page = fs::read_to_string(root().join("docs/complaints.md")).expect("the page");
     let own =
         fs::read_to_string(root().join("crates/cli/tests/cli/complaints.rs")).expect("this file");

@@ -60,6 +60,15 @@ fn ineffective_options_of_run_are_rejected() {
             "cannot be used with",
         ),
         (&["--spoil", "{dur_0: [9, 11]}"], "--world"),
+        (
+            &[
+                "--spoil",
+                "{dur_0: [9, 11]}",
+                "--world",
+                "cases/delivery/world.toml",
+            ],
+            "--spoil has no effect without --world spoiler",
+        ),
         (&["--realtime", "1e-30"], "between 0.000001"),
         (&["--planning-time", "soon"], "--planning-time 2.5"),
         (&["--jobs", "2", "--planner", "none"], "leave out --jobs"),

@@ -412,6 +412,29 @@ fn fluents_without_value_that_change_nothing_are_not_named() {
     }
 }
 
+/// An action whose over-all condition never holds contributes to no goal, although its duration is not known to be
+/// positive.
+#[test]
+fn fluents_of_actions_that_cannot_end_are_not_named() {
+    let domain = "(:requirements :typing :fluents) (:types place) (:constants home shop - place)
+        (:functions (time ?a ?b - place) (coins)) (:predicates (at ?p - place) (path ?a ?b - place) (bought))
+        (:durative-action go :parameters (?a ?b - place) :duration (= ?duration (time ?a ?b))
+          :condition (and (at start (at ?a)) (over all (path ?a ?b)))
+          :effect (and (at start (not (at ?a))) (at end (at ?b))))
+        (:action buy :parameters () :precondition (and (at shop) (>= (coins) 5)) :effect (bought))";
+    let init =
+        "(at home) (path home shop) (path shop home) (= (time home shop) 3) (= (time shop home) 3)";
+    for (coins, expected) in [("", &["(coins)"] as &[_]), ("(= (coins) 1)", &[])] {
+        let task = task(
+            domain,
+            &format!("{init} {coins}"),
+            "(and (bought) (at home))",
+        );
+        let fluents = fluents_without_value(&task, &Situation::initial(&task));
+        assert_eq!(fluents, expected);
+    }
+}
+
 /// An action for the goal `(there)` whose condition or effect mentions `(used)`.
 #[test]
 fn fluent_without_value_is_named_wherever_it_is_mentioned() {

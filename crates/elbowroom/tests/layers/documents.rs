@@ -105,3 +105,22 @@ fn tutorial_chapters_are_not_empty() {
         assert!(chapter.starts_with("# "), "{chapter}");
     }
 }
+
+/// Examples in documents are copied by readers, and a reflowed comment breaks a file.
+#[test]
+fn examples_in_toml_can_be_read() {
+    let mut wrong = Vec::new();
+    let mut count = 0;
+    for document in documents() {
+        let text = fs::read_to_string(&document).expect("a document");
+        for block in text.split("\n```toml\n").skip(1) {
+            let example = block.split("\n```").next().expect("a block");
+            count += 1;
+            if let Err(error) = example.parse::<toml::Table>() {
+                wrong.push(format!("{}: {error}", document.display()));
+            }
+        }
+    }
+    assert!(count > 5, "{count} examples");
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}

@@ -204,9 +204,13 @@ fn only_the_laboratory_has_a_pool_of_threads() {
 /// Crates that communicate with the world. They use threads only to wait for others.
 const ADAPTER_CRATES: [&str; 5] = ["cli", "executive", "external", "plansys2", "python"];
 
+/// Files of computing crates that may create threads: the parallel search of the planner, and the search behind an
+/// iterator of improving plans, which runs between the calls of its user.
+const FILES_WITH_THREADS: [&str; 2] = ["improving.rs", "parallel.rs"];
+
 /// The third convention of ARCHITECTURE.md. Tests may create threads.
 #[test]
-fn threads_are_spawned_in_one_file() {
+fn threads_are_spawned_in_the_listed_files() {
     let mut found = Vec::new();
     for (name, _) in LAYERS {
         if ADAPTER_CRATES.contains(name) {
@@ -222,41 +226,46 @@ fn threads_are_spawned_in_one_file() {
                 }
                 let text = fs::read_to_string(&path).unwrap_or_default();
                 let code = text.split("#[cfg(test)]\nmod tests").next();
-                let makes = ["thread::spawn", "thread::scope", "thread::Builder"];
-                if code.is_some_and(|code| makes.iter().any(|it| code.contains(it))) {
+                if code.is_some_and(|code| creates_threads(code)) {
                     found.push(path.file_name().expect("a name").to_owned());
                 }
             }
         }
     }
-    assert_eq!(found, ["parallel.rs"]);
+    found.sort();
+    assert_eq!(found, FILES_WITH_THREADS);
+}
+
+/// Returns true if the code creates threads, also by imported names.
+fn creates_threads(code: &str) -> bool {
+    let names = ["thread::spawn", "thread::scope", "thread::Builder"];
+    names.iter().any(|name| code.contains(name))
+        || code.contains("use std::thread::")
+            && [" spawn(", " scope(", "Builder::new("]
+                .iter()
+                .any(|call| code.contains(call))
 }
 
 /// Cargo lists the dependencies of the library alone.
 #[test]
-fn the_library_builds_neither_plots_nor_threads() {
-    let tree = |arguments: &[&str]| {
-        let output = Command::new(env!("CARGO"))
-            .args(["tree", "--offline", "--locked", "--package", "elbowroom"])
-            .args(["--edges", "normal", "--prefix", "none", "--format", "{p}"])
-            .args(arguments)
-            .current_dir(workspace())
-            .output()
-            .expect("cargo starts");
-        let errors = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(output.status.success(), "{errors}");
-        String::from_utf8(output.stdout).expect("UTF-8")
-    };
-    let has = |tree: &str, package: &str| {
+fn library_builds_neither_thread_pool_nor_command_line() {
+    let output = Command::new(env!("CARGO"))
+        .args(["tree", "--offline", "--locked", "--package", "elbowroom"])
+        .args(["--edges", "normal", "--prefix", "none", "--format", "{p}"])
+        .current_dir(workspace())
+        .output()
+        .expect("cargo starts");
+    let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{errors}");
+    let tree = String::from_utf8(output.stdout).expect("UTF-8");
+    let has = |package: &str| {
         let mut names = tree.lines().filter_map(|line| line.split(' ').next());
         names.any(|name| name == package)
     };
-    let plain = tree(&[]);
-    assert!(has(&plain, "elbowroom-execution"), "{plain}");
-    for unwanted in ["plotters", "rayon", "clap"] {
-        assert!(!has(&plain, unwanted), "{unwanted} is in\n{plain}");
+    assert!(has("elbowroom-execution"), "{tree}");
+    for unwanted in ["rayon", "clap"] {
+        assert!(!has(unwanted), "{unwanted} is in\n{tree}");
     }
-    assert!(has(&tree(&["--features", "plots"]), "plotters"));
 }
 
 /// Returns the transitive dependencies of a crate, by the table.

@@ -1,18 +1,22 @@
 //! The starts of a run, and their outcomes.
 
+mod executed;
+mod known_start;
+
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
 use elbowroom_model::Step;
-use elbowroom_model::ground::{
-    Action, Body, Change, Condition, DurativeBody, Effect, Expression, SnapAction,
-};
+use elbowroom_model::ground::Action;
 use elbowroom_num::Rational;
 
 use super::start_dependencies::{StartDependency, StepEvent, start_dependencies};
 use crate::belief_state::BeliefState;
 use crate::event::{ActionHandle, Ending, Measured};
-use crate::executor::{Order, PreparedPlan, StepId};
+use crate::executor::{Order, PlanEvent, PreparedPlan, StepId};
+
+pub use executed::ExecutedStep;
+pub use known_start::KnownStart;
 
 /// Number of steps in the report of an executive that were executed before it was last idle.
 const MAX_REPORTED_STEPS: usize = 2000;
@@ -76,49 +80,27 @@ pub(super) struct StartEntry {
     is_past: bool,
 }
 
-/// A start, with all that is needed to resume the run.
-#[derive(Clone, Debug, PartialEq)]
-pub struct KnownStart {
-    /// The identifier for reports of the world.
-    pub ticket: ActionHandle,
-    /// The action.
-    pub action: Arc<Action>,
-    /// The planned duration; `None` for an instantaneous action.
-    pub planned: Option<Rational>,
-    /// The time of the command.
-    pub commanded: Rational,
-    /// The time of its start, if it has started.
-    pub started: Option<Rational>,
-    /// The time and the completion of its last reported progress after its start.
-    pub progress: Option<(Rational, Rational)>,
-    /// The time and the outcome of its end, if it has ended.
-    pub ended: Option<(Rational, Ending)>,
-    /// The time of the cancellation, if it was cancelled.
-    pub cancelled: Option<Rational>,
-    /// Its time-out, if it has reached it.
-    pub timed_out: Option<Rational>,
-    /// `true` if it is unknown whether its end has happened.
-    pub is_in_doubt: bool,
-    /// The latest tolerable end according to the last warning of it.
-    pub warned: Option<Rational>,
-    /// The time-out according to the last warning of it.
-    pub warned_timeout: Option<Rational>,
-    /// The amounts measured at its start, and at its end.
-    pub measured: [Vec<Measured>; 2],
-}
-
-/// An executed action, as a step of a plan for the validator.
-///
-/// Measured amounts replace those of the domain, and there are no duration constraints. An action
-/// that was stopped has only its start effects and its continuous effects.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ExecutedStep {
-    /// The ticket of the start.
-    pub ticket: ActionHandle,
-    /// The outcome; `None` if it had not ended.
-    pub ending: Option<Ending>,
-    /// The step.
-    pub step: Step,
+impl StartEntry {
+    /// Creates the entry of a commanded start.
+    fn new(action: &Arc<Action>, planned: Option<Rational>, commanded: Rational) -> Self {
+        Self {
+            action: Arc::clone(action),
+            planned,
+            step: None,
+            commanded,
+            started: None,
+            progress: None,
+            ended: None,
+            cancelled: None,
+            timed_out: None,
+            is_in_doubt: false,
+            warned: None,
+            warned_timeout: None,
+            latest_tolerable_end: None,
+            measured: [Vec::new(), Vec::new()],
+            is_past: false,
+        }
+    }
 }
 
 impl ActionLog {
@@ -130,22 +112,10 @@ impl ActionLog {
     ) -> Self {
         let mut account = Self::default();
         for (ticket, underway) in belief.running() {
+            let (planned, start) = (underway.planned.clone(), underway.start.clone());
             let opened = StartEntry {
-                action: Arc::clone(&underway.action),
-                planned: Some(underway.planned.clone()),
-                step: None,
-                commanded: underway.start.clone(),
-                started: Some(underway.start.clone()),
-                progress: None,
-                ended: None,
-                cancelled: None,
-                timed_out: None,
-                is_in_doubt: false,
-                warned: None,
-                warned_timeout: None,
-                latest_tolerable_end: None,
-                measured: [Vec::new(), Vec::new()],
-                is_past: false,
+                started: Some(start.clone()),
+                ..StartEntry::new(&underway.action, Some(planned), start)
             };
             account.entries.insert(*ticket, opened);
             // Tickets in between belong to actions that have ended.
@@ -160,59 +130,6 @@ impl ActionLog {
     /// Returns the number of actions started.
     pub fn started(&self) -> usize {
         self.started
-    }
-
-    /// Restores a log with `started` starts. Starts that are not in `known` count as long past:
-    /// late reports about them are ignored.
-    pub(super) fn restore(&mut self, started: usize, known: Vec<KnownStart>) {
-        *self = Self {
-            started,
-            ..Self::default()
-        };
-        for it in known {
-            let opened = StartEntry {
-                action: it.action,
-                planned: it.planned,
-                step: None,
-                commanded: it.commanded,
-                started: it.started,
-                progress: it.progress,
-                ended: it.ended,
-                cancelled: it.cancelled,
-                timed_out: it.timed_out,
-                is_in_doubt: it.is_in_doubt,
-                warned: it.warned,
-                warned_timeout: it.warned_timeout,
-                latest_tolerable_end: None,
-                measured: it.measured,
-                is_past: false,
-            };
-            if opened.ended.is_none() {
-                self.open.insert(it.ticket);
-            }
-            self.entries.insert(it.ticket, opened);
-        }
-    }
-
-    /// Returns all starts that are not long past.
-    pub(super) fn known_starts(&self) -> Vec<KnownStart> {
-        let known = self.entries.iter().filter(|(_, it)| !it.is_past);
-        let known = known.map(|(ticket, it)| KnownStart {
-            ticket: *ticket,
-            action: Arc::clone(&it.action),
-            planned: it.planned.clone(),
-            commanded: it.commanded.clone(),
-            started: it.started.clone(),
-            progress: it.progress.clone(),
-            ended: it.ended.clone(),
-            cancelled: it.cancelled.clone(),
-            timed_out: it.timed_out.clone(),
-            is_in_doubt: it.is_in_doubt,
-            warned: it.warned.clone(),
-            warned_timeout: it.warned_timeout.clone(),
-            measured: it.measured.clone(),
-        });
-        known.collect()
     }
 
     /// Marks ended starts as long past, except for the latest ones and those in `but_for`. Called
@@ -286,21 +203,8 @@ impl ActionLog {
         let ticket = ActionHandle(self.started as u64);
         self.started += 1;
         let opened = StartEntry {
-            action: Arc::clone(&order.action),
-            planned: order.duration.clone(),
             step: Some(order.step),
-            commanded: now.clone(),
-            started: None,
-            progress: None,
-            ended: None,
-            cancelled: None,
-            timed_out: None,
-            is_in_doubt: false,
-            warned: None,
-            warned_timeout: None,
-            latest_tolerable_end: None,
-            measured: [Vec::new(), Vec::new()],
-            is_past: false,
+            ..StartEntry::new(&order.action, order.duration.clone(), now.clone())
         };
         self.entries.insert(ticket, opened);
         self.plan.steps.insert(order.step, ticket);
@@ -485,79 +389,64 @@ impl ActionLog {
         }
     }
 
-    /// Returns all actions that have started and are not forgotten, as steps for the validator.
-    pub(super) fn executed(&self, now: &Rational) -> Vec<ExecutedStep> {
-        self.finished_steps
-            .iter()
-            .cloned()
-            .chain(self.executed_steps(now))
-            .collect()
-    }
-
-    fn executed_steps<'a>(&'a self, now: &'a Rational) -> impl Iterator<Item = ExecutedStep> + 'a {
-        self.entries.iter().filter_map(move |(ticket, entry)| {
-            let start = entry.started.clone()?;
-            let end = entry.ended.as_ref().map_or(now, |(time, _)| time);
-            let ending = entry.ended.as_ref().map(|(_, ending)| ending.clone());
-            let is_whole = ending == Some(Ending::Succeeded);
-            let duration = entry
-                .planned
-                .as_ref()
-                .map(|_| (end - &start).max(Rational::ZERO));
-            Some(ExecutedStep {
-                ticket: *ticket,
-                ending,
-                step: Step {
-                    action: Arc::new(action_as_executed(entry, is_whole)),
-                    start,
-                    duration,
-                },
-            })
-        })
-    }
-}
-
-/// Returns the action with the measured amounts, with its planned duration wherever it reads
-/// `?duration` before its end, and without the effects that did not happen.
-fn action_as_executed(entry: &StartEntry, is_whole: bool) -> Action {
-    let planned = entry.planned.as_ref();
-    let planned = planned.and_then(|planned| entry.action.with_planned_duration(planned));
-    let mut action = planned.unwrap_or_else(|| Action::clone(&entry.action));
-    match &mut action.body {
-        Body::Instantaneous(snap) => set_measured_amounts(snap, &entry.measured[0]),
-        Body::Durative(body) => {
-            body.duration.clear();
-            for (snap, measured) in [&mut body.start, &mut body.end]
-                .into_iter()
-                .zip(&entry.measured)
-            {
-                if !measured.is_empty() {
-                    set_measured_amounts(Arc::make_mut(snap), measured);
-                }
-            }
-            if !is_whole {
-                truncate_cancelled(body);
-            }
+    /// Returns the steps of a plan to which these starts belong: of each action, the first ones
+    /// that are not running when the plan begins. `None` if a start belongs to no step.
+    pub(super) fn match_steps(
+        &self,
+        mission: &PreparedPlan,
+        begun: &[ActionHandle],
+    ) -> Option<BTreeMap<StepId, ActionHandle>> {
+        if begun.is_empty() {
+            return Some(BTreeMap::new());
         }
+        let steps = mission.instances.iter().zip(&mission.time_triggered.steps);
+        let steps = steps.map(|(instance, step)| (StepId::from(*instance), step));
+        let mut left: Vec<_> = steps
+            .filter(|(id, _)| !mission.running.contains_key(id))
+            .collect();
+        left.sort_by(|(_, one), (_, other)| one.start.cmp(&other.start));
+        let step_of = |ticket: &ActionHandle| {
+            let name = &self.get(*ticket)?.action.name;
+            let index = left.iter().position(|(_, it)| it.action.name == *name)?;
+            Some((left.remove(index).0, *ticket))
+        };
+        begun.iter().map(step_of).collect()
     }
-    action
-}
 
-fn set_measured_amounts(snap: &mut SnapAction, measured: &[Measured]) {
-    for Effect { change, .. } in &mut snap.effects {
-        if let Change::Update { fluent, value, .. } = change
-            && let Some(measured) = measured.iter().find(|measured| measured.fluent == *fluent)
-        {
-            *value = Expression::Constant(measured.amount.clone());
+    /// Returns the start of a step as news.
+    pub(super) fn start_event(
+        &self,
+        step: StepId,
+        ticket: ActionHandle,
+    ) -> Option<(Rational, PlanEvent)> {
+        let time = self.get(ticket)?.started.clone()?;
+        let measured = Vec::new();
+        let news = PlanEvent::Started {
+            step,
+            time: time.clone(),
+            measured,
+        };
+        Some((time, news))
+    }
+
+    /// Returns the end of a step as news. An instantaneous action ends when it starts.
+    pub(super) fn end_event(
+        &self,
+        step: StepId,
+        ticket: ActionHandle,
+    ) -> Option<(Rational, PlanEvent)> {
+        let entry = self.get(ticket)?;
+        let (time, ending) = entry.ended.clone()?;
+        if entry.planned.is_none() && entry.started.is_some() {
+            return None;
         }
+        let measured = Vec::new();
+        let news = PlanEvent::Ended {
+            step,
+            time: time.clone(),
+            ending,
+            measured,
+        };
+        Some((time, news))
     }
-}
-
-/// Removes the end and the over-all conditions of a cancelled action.
-fn truncate_cancelled(body: &mut DurativeBody) {
-    body.over_all = Condition::TRUE;
-    body.end = Arc::new(SnapAction {
-        condition: Condition::TRUE,
-        effects: Vec::new(),
-    });
 }

@@ -5,13 +5,12 @@ use std::sync::Arc;
 use elbowroom_model::TimeTriggeredPlan;
 use elbowroom_num::Rational;
 
-use super::pending::PreparationFallback;
+use super::agenda::{Attempt, PreparationFallback};
 use super::plan_start::PlanStart;
-use super::replanning::Attempt;
+use super::settings::{PlanningTime, RunningRule};
 use super::situation::OverrunEstimate;
-use super::{PlanningTime, Run, RunningRule, Stop};
-use crate::executor::{PlanForm, PreparedPlan};
-use crate::planning::PlanAnswer;
+use super::{Run, Stop};
+use crate::executor::PreparedPlan;
 use crate::reason::{Cause, Reason};
 use crate::record::Entry;
 
@@ -24,11 +23,11 @@ impl Run<'_> {
         }
         let reason = Reason::new(Cause::MoreSlack).since(self.now.clone());
         if self.plans_aside() {
-            self.search_for_a_better_plan(reason);
+            self.search_beside_plan(reason, None);
             return false;
         }
         let guess = OverrunEstimate::QuarterLonger;
-        let (situation, running) = self.situation(&Rational::ZERO, guess);
+        let (situation, running) = self.view().situation(&Rational::ZERO, guess);
         self.ports.recorder.record(&Entry::Planning {
             now: &self.now,
             reason: &reason,
@@ -50,27 +49,19 @@ impl Run<'_> {
     fn may_seek_better_plan(&self) -> bool {
         let takes_no_time = self.settings.planning_time == PlanningTime::Seconds(Rational::ZERO);
         let has_planner = if self.plans_aside() {
-            self.search.is_none() && self.anticipated_replan.is_none()
+            self.background.search().is_none() && self.background.anticipated().is_none()
         } else {
             takes_no_time && !self.settings.plans_aside
         };
-        let can_continue = |ticket| self.belief.running().contains_key(&ticket);
         has_planner
-            && !self.search_results.has_better_search_failed
-            && !self.search_results.is_plan_infeasible
+            && self.search_results.may_seek_better_plan()
             && self.settings.running == RunningRule::Keep
-            && self.replans < self.settings.max_replans
-            && self.ports.executor.need() != PlanForm::PartialOrder
-            && !self.is_goal_change_pending()
-            && !self.is_paused()
-            && self.action_log.open_tickets().all(can_continue)
+            && self.replans.count() < self.settings.max_replans
+            && !self.chooses_order()
+            && !self.goals.is_change_pending()
+            && !self.goals.is_paused()
+            && self.view().are_all_starts_reported()
             && self.belief.failing_actions().is_empty()
-    }
-
-    /// Records that the planner has found no better plan. If there is certainly none, searching
-    /// again is cheap.
-    pub(super) fn note_no_better_plan(&mut self, answer: &PlanAnswer) {
-        self.search_results.has_better_search_failed = *answer != PlanAnswer::Unsolvable;
     }
 
     /// Returns `true` if a prepared plan takes over from the present one, and counts the new plan
@@ -92,14 +83,10 @@ impl Run<'_> {
     }
 
     /// Has a plan prepared. It takes over if it is better than the present one.
-    pub(super) fn prepare_better_plan(&mut self, attempt: Attempt, plan: &TimeTriggeredPlan) {
-        let (task, goals) = (Arc::clone(&self.task), self.goals());
-        let course = PlanStart::of(plan, &attempt.situation, &attempt.running);
-        self.await_preparation(
-            &task,
-            &goals,
-            course,
-            PreparationFallback::ContinuePlan(attempt.reason),
-        );
+    pub(super) fn prepare_better_plan(&mut self, attempt: Attempt, plan: TimeTriggeredPlan) {
+        let (task, goals) = (Arc::clone(&self.task), self.goals.open());
+        let course = (plan, attempt.situation, attempt.running);
+        let fallback = PreparationFallback::ContinuePlan(attempt.reason);
+        self.await_preparation(&task, &goals, PlanStart::of(&course), fallback);
     }
 }

@@ -9,24 +9,16 @@ use std::sync::Arc;
 use elbowroom_model::ground::{Action, Body, SnapAction};
 use elbowroom_num::Rational;
 
-use super::dead_end::BelievedEventKind;
+use super::agenda::{Next, PendingStep};
+use super::history::BelievedEventKind;
 use super::observations::Remark;
-use super::work_queue::PendingStep;
-use super::{MissingPlan, Next, Run, Stop, Verdict};
+use super::settings::{MissingPlan, Verdict};
+use super::{Run, Stop};
 use crate::belief_state::Doubt;
 use crate::event::{ActionHandle, Ending, Measured};
 use crate::executor::PlanEvent;
 use crate::planning::PlanAnswer;
 use crate::reason::Reason;
-
-/// The last question to the world about doubts.
-#[derive(Clone, Debug, Default)]
-pub(super) struct DoubtInquiry {
-    /// It covers the doubts that arose until then.
-    until: Option<Rational>,
-    /// `true` until the world has answered.
-    pub(super) is_open: bool,
-}
 
 impl Run<'_> {
     /// Marks the effects of an action as doubtful: it is unknown whether it has ended, or whether
@@ -76,7 +68,7 @@ impl Run<'_> {
             }
             self.plan_events.push(PlanEvent::Value(fluent));
         }
-        self.record_unexpected_event();
+        self.background.note_unexpected_event();
         Some("it had timed out; its effects are now known")
     }
 
@@ -86,20 +78,15 @@ impl Run<'_> {
         let (facts, values) = (self.belief.doubtful_facts(), self.belief.doubtful_values());
         let doubts = facts.values().chain(values.values()).flatten();
         let latest = doubts.map(|doubt| &doubt.since).max();
-        let inquiry = &self.search_results.inquiry;
-        let Some(latest) = latest.filter(|latest| inquiry.until.as_ref() < Some(*latest)) else {
+        if !latest.is_some_and(|latest| self.search_results.begin_inquiry(latest)) {
             return false;
-        };
+        }
         let look = Next::Look {
             facts: facts.keys().copied().collect(),
             fluents: values.keys().copied().collect(),
         };
-        self.search_results.inquiry = DoubtInquiry {
-            until: Some(latest.clone()),
-            is_open: true,
-        };
-        self.work_queue.push(PendingStep::Plan(reason.clone()));
-        self.open_request = Some(look);
+        self.agenda.push(PendingStep::Plan(reason.clone()));
+        self.agenda.ask(look);
         true
     }
 
@@ -132,8 +119,8 @@ impl Run<'_> {
         let running: Vec<ActionHandle> = self.action_log.open_tickets().collect();
         let doubts = self.belief.doubt_count();
         if outcome.is_err() && !running.is_empty() && doubts > 0 {
-            self.work_queue.push(PendingStep::Plan(reason));
-            self.work_queue
+            self.agenda.push(PendingStep::Plan(reason));
+            self.agenda
                 .push(PendingStep::WaitForActions(running, doubts));
             return Ok(());
         }

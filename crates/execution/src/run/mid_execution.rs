@@ -3,10 +3,15 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::work_queue::PendingStep;
-use super::{ActionHandle, ActionLog, BeliefState, PlanEvent, Ports, Run, RunSettings};
-use crate::executor::PreparedPlan;
-use crate::executor::StepId;
+use super::action_log::ActionLog;
+use super::agenda::PendingStep;
+use super::history::History;
+use super::replans::Replans;
+use super::settings::RunSettings;
+use super::{Ports, Run};
+use crate::belief_state::BeliefState;
+use crate::event::ActionHandle;
+use crate::executor::{PlanEvent, PreparedPlan, StepId};
 use crate::reason::Reason;
 
 /// Initial state of such a run.
@@ -50,15 +55,15 @@ impl<'a> Run<'a> {
         let mut run = Self::new(Arc::clone(belief.task()), None, settings, ports);
         run.now.clone_from(belief.time());
         run.action_log = ActionLog::mid_execution(&belief, &running);
-        run.initial_belief = belief.clone();
+        run.history = History::new(belief.clone());
         run.belief = belief;
-        run.replans = replans;
+        run.replans = Replans::restored(replans);
         run.plan_events = news;
-        run.work_queue = match beginning {
-            EntryPoint::Continue => Vec::new(),
-            EntryPoint::Adopt(mission) => vec![PendingStep::AdoptPrepared(mission)],
-            EntryPoint::Replan(reason) => vec![PendingStep::Replan(reason)],
-        };
+        run.agenda.restart_with(match beginning {
+            EntryPoint::Continue => PendingStep::Decide,
+            EntryPoint::Adopt(mission) => PendingStep::AdoptPrepared(mission),
+            EntryPoint::Replan(reason) => PendingStep::Replan(reason),
+        });
         run
     }
 }

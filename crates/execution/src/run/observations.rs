@@ -1,12 +1,11 @@
 //! Processing of reports: each report counts once, and implausible ones are corrected or ignored.
 
-use std::sync::Arc;
-
 use elbowroom_model::ground::{Action, Body, Expression};
 use elbowroom_num::Rational;
 
 use super::Run;
-use super::dead_end::BelievedEventKind;
+use super::background::BackgroundSearch;
+use super::history::BelievedEventKind;
 use crate::event::{ActionHandle, Ending, Event, Measured, Observation};
 use crate::executor::{Amount, PlanEvent, Planned};
 use crate::measured_amounts;
@@ -47,7 +46,7 @@ impl Run<'_> {
     pub(super) fn process_reports(&mut self, observations: Vec<Observation>) {
         let timed_before = self.belief.past_timed_initials();
         // Deadlines are later than release times.
-        self.release_goals();
+        self.with_goals(|goals, it| goals.release_goals(it));
         // For each observation, the earliest time among it and the later ones; in reverse order.
         let mut earliest: Vec<Rational> = Vec::with_capacity(observations.len());
         for observation in observations.iter().rev() {
@@ -57,7 +56,7 @@ impl Run<'_> {
         }
         for observation in observations {
             if let Some(time) = earliest.pop() {
-                self.close_goals_due_before(&time);
+                self.with_goals(|goals, it| goals.close_goals_due_before(it, &time));
             }
             let planned = self.planned_window(&observation.event);
             let remark = self.process_report(&observation);
@@ -70,10 +69,10 @@ impl Run<'_> {
         }
         // The belief advances when all events up to now are known.
         let now = self.now.clone();
-        self.close_goals_due_before(&now);
+        self.with_goals(|goals, it| goals.close_goals_due_before(it, &now));
         let _ = self.belief.advance(&now);
-        self.close_momentary_goals();
-        self.tend_kept_goals();
+        self.with_goals(|goals, it| goals.close_momentary_goals(it));
+        self.with_goals(|goals, it| goals.tend_kept_goals(it));
         self.record_timed_initials_while_idle(timed_before);
         (self.listener)(&self.belief);
     }
@@ -115,7 +114,7 @@ impl Run<'_> {
                 }
                 if self.belief.observe_fact(*fact, *truth) {
                     self.record_believed_event(&time, BelievedEventKind::Fact(*fact, *truth));
-                    self.record_unexpected_event();
+                    self.background.note_unexpected_event();
                     self.plan_events.push(PlanEvent::Fact(*fact));
                 }
                 None
@@ -127,14 +126,22 @@ impl Run<'_> {
                         &time,
                         BelievedEventKind::Value(*fluent, value.clone()),
                     );
-                    self.record_unexpected_event();
+                    self.background.note_unexpected_event();
                     self.plan_events.push(PlanEvent::Value(*fluent));
                 }
                 None
             }
             Event::Asked(request) => return self.process_request(request),
-            Event::PlanMade => return self.record_plan_finished(),
-            Event::PlanReady => return self.note_plan_ready(),
+            Event::PlanMade => {
+                let search = self.background.search_mut();
+                let is_new = search.is_some_and(BackgroundSearch::note_finished);
+                return (!is_new).then_some("no plan was being made");
+            }
+            Event::PlanReady => {
+                let search = self.background.search_mut();
+                let is_new = search.is_some_and(|search| search.note_ready(&self.now));
+                return (!is_new).then_some("no plan was being prepared");
+            }
             Event::Unintelligible { said, why } => {
                 self.clock_watchdog.record_unreadable_message(said, why);
                 return Some("cannot be parsed; it is ignored");
@@ -169,6 +176,15 @@ impl Run<'_> {
         } else {
             UNKNOWN_TICKET
         }
+    }
+
+    /// Records an observation that was believed, for a later explanation of a dead end.
+    pub(super) fn record_believed_event(&mut self, time: &Rational, kind: BelievedEventKind) {
+        self.search_results.forget_failure();
+        if !matches!(kind, BelievedEventKind::Stopped(_)) {
+            self.refusal_backoff.reset();
+        }
+        self.history.record(time, kind);
     }
 
     /// Advances the belief to the time of a report. The belief never goes back in time, so a late
@@ -206,7 +222,10 @@ impl Run<'_> {
         let (action, step) = (entry.action.clone(), entry.step);
         let planned = entry.planned.clone().unwrap_or_default();
         self.advance_belief(time);
-        self.note_measured(measured);
+        if !measured.is_empty() {
+            // The executor of the next plan does not receive the amounts, only the resulting values.
+            self.background.note_unexpected_effects();
+        }
         let amounts = self.amounts(&action, false, Some(&planned), measured);
         // An effect that cannot be computed does not change its fluent.
         let _ = self.belief.start(ticket, &action, &planned, measured);
@@ -258,7 +277,10 @@ impl Run<'_> {
         }
         let step = self.action_log.get(ticket).and_then(|entry| entry.step);
         self.advance_belief(&time);
-        self.note_measured(measured);
+        if !measured.is_empty() {
+            // The executor of the next plan does not receive the amounts, only the resulting values.
+            self.background.note_unexpected_effects();
+        }
         let mut amounts = Vec::new();
         if *ending == Ending::Succeeded {
             if let Some(underway) = self.belief.running().get(&ticket) {
@@ -270,7 +292,7 @@ impl Run<'_> {
         } else {
             self.belief.stop(ticket);
             self.record_believed_event(&time, BelievedEventKind::Stopped(ticket));
-            self.record_unexpected_event();
+            self.background.note_unexpected_event();
             if is_refused && let Some(entry) = self.action_log.get(ticket) {
                 self.refusal_backoff
                     .record_refusal(&entry.action.name, &self.now);
@@ -347,7 +369,7 @@ impl Run<'_> {
         };
         let action = entry.action.clone();
         self.doubt(ticket, &action, true);
-        self.record_unexpected_event_for_preparation();
+        self.background.note_unexpected_effects();
         self.plan_events.push(PlanEvent::Contradiction {
             action: action.name.clone(),
         });
@@ -367,43 +389,6 @@ impl Run<'_> {
         for effect in effects {
             self.plan_events
                 .push(PlanEvent::from_change(&effect.change));
-        }
-    }
-
-    /// Cancels an action that has reached its time-out. If it was cancelled before and has not
-    /// ended, it counts as failed, and its end effects are in doubt.
-    pub(super) fn time_out(&mut self, ticket: ActionHandle, since: Rational) {
-        let Some(entry) = self.action_log.get(ticket) else {
-            return;
-        };
-        if entry.cancelled.is_none() {
-            self.action_log.note_timeout(ticket, &since);
-            self.cancel(vec![ticket]);
-            return;
-        }
-        let since = entry.timed_out.clone().unwrap_or(since);
-        let (action, has_started) = (Arc::clone(&entry.action), entry.started.is_some());
-        self.belief.stop(ticket);
-        self.record_unexpected_event_for_preparation();
-        let now = self.now.clone();
-        self.record_believed_event(&now, BelievedEventKind::Stopped(ticket));
-        self.doubt(ticket, &action, has_started);
-        self.action_log.note_doubt(ticket, true);
-        self.end_timed_out(ticket, &now, since);
-    }
-
-    /// Ends an action that has timed out: it has ended without its effects, or counts as ended.
-    fn end_timed_out(&mut self, ticket: ActionHandle, time: &Rational, since: Rational) {
-        let entry = self.action_log.get(ticket);
-        let Some((action, step)) = entry.map(|entry| (entry.action.name.clone(), entry.step))
-        else {
-            return;
-        };
-        let why = "it timed out".to_owned();
-        self.action_log
-            .note_end(ticket, time, &Ending::Failed { why }, &[]);
-        if step.is_some() {
-            self.plan_events.push(PlanEvent::TimedOut { action, since });
         }
     }
 }

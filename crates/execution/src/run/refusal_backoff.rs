@@ -10,10 +10,6 @@ use std::collections::BTreeMap;
 
 use elbowroom_num::Rational;
 
-use super::Run;
-use super::work_queue::PendingStep;
-use crate::reason::Reason;
-
 /// Maximum number of doublings of the wait: to 51 s.
 const MAX_DOUBLINGS: u32 = 9;
 
@@ -43,23 +39,5 @@ impl RefusalBackoff {
         if !self.times.is_empty() {
             *self = Self::default();
         }
-    }
-}
-
-impl Run<'_> {
-    /// Waits before a plan is requested, if the same action would only be refused again. Returns
-    /// `true` if it waits.
-    pub(super) fn wait_after_refusal(&mut self, reason: &Reason) -> bool {
-        let until = self.refusal_backoff.until.clone();
-        if !self.settings.plans_aside || self.now >= until || self.is_goal_change_pending() {
-            return false;
-        }
-        self.work_queue.push(PendingStep::Replan(reason.clone()));
-        self.work_queue.push(PendingStep::CheckTimeouts);
-        let timeout = self.next_timeout().into_iter();
-        let until = timeout.chain([until]).min().unwrap_or_default();
-        self.work_queue
-            .push(PendingStep::Wait(until.max(self.now.clone())));
-        true
     }
 }

@@ -1,29 +1,17 @@
 //! Transition from one plan to the next.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
-
-use elbowroom_model::{Situation, Task};
 use elbowroom_num::Rational;
 
+use super::agenda::{Attempt, FinishedPlan, PendingStep};
 use super::plan_start::PlanStart;
-use super::situation::{OverrunEstimate, situation_at};
-use super::work_queue::{FinishedPlan, PendingStep};
-use super::{MissingPlan, PlanningTime, Run, RunningRule, Stop, Verdict};
+use super::settings::{MissingPlan, PlanningTime, RunningRule, Verdict};
+use super::situation::OverrunEstimate;
+use super::{Run, Stop};
 use crate::event::ActionHandle;
+use crate::executor::PlanEvent;
 use crate::planning::{PlanAnswer, Planned};
 use crate::reason::Reason;
 use crate::record::Entry;
-
-/// Request for a plan for which the run waits.
-pub(super) struct Attempt {
-    pub(super) reason: Reason,
-    pub(super) guess: OverrunEstimate,
-    pub(super) situation: Situation,
-    pub(super) running: Vec<ActionHandle>,
-    /// `true` if the present plan continues unless the new one is better.
-    pub(super) is_optional: bool,
-}
 
 /// The next attempt after no plan was found.
 pub(super) enum NextAttempt {
@@ -40,16 +28,16 @@ impl Run<'_> {
     pub(super) fn settle_running_actions(&mut self) {
         match self.settings.running {
             RunningRule::Keep => {
-                let lost = self.actions_that_cannot_continue();
-                self.work_queue
+                let lost = self.view().actions_that_cannot_continue();
+                self.agenda
                     .push(PendingStep::WaitForRunning(Some(lost.clone())));
-                self.work_queue.push(PendingStep::Cancel(lost));
+                self.agenda.push(PendingStep::Cancel(lost));
             }
-            RunningRule::Await => self.work_queue.push(PendingStep::WaitForRunning(None)),
+            RunningRule::Await => self.agenda.push(PendingStep::WaitForRunning(None)),
             RunningRule::Cancel => {
-                self.work_queue.push(PendingStep::WaitForRunning(None));
+                self.agenda.push(PendingStep::WaitForRunning(None));
                 let running = self.action_log.open_tickets().collect();
-                self.work_queue.push(PendingStep::Cancel(running));
+                self.agenda.push(PendingStep::Cancel(running));
             }
         }
     }
@@ -73,7 +61,7 @@ impl Run<'_> {
         let mut running = tickets.iter();
         if running.any(|ticket| self.belief.running().contains_key(ticket))
             && self.belief.doubt_count() == doubts
-            && !self.is_goal_change_pending()
+            && !self.goals.is_change_pending()
         {
             self.wait_until_timeout(PendingStep::WaitForActions(tickets, doubts));
         }
@@ -82,42 +70,24 @@ impl Run<'_> {
     /// Waits until the next time-out or its warning at the latest, and performs `todo` then. If
     /// nothing can time out, nothing is running.
     fn wait_until_timeout(&mut self, todo: PendingStep) {
-        let Some(until) = self.next_timeout() else {
+        let Some(until) = self.view().next_timeout() else {
             return;
         };
-        self.work_queue.push(todo);
-        self.work_queue.push(PendingStep::CheckTimeouts);
-        let until = until.max(self.now.clone());
-        self.work_queue.push(PendingStep::Wait(until));
-    }
-
-    /// Returns the actions that no plan can continue: those that have not started, and those whose
-    /// over-all condition fails.
-    fn actions_that_cannot_continue(&self) -> Vec<ActionHandle> {
-        let breaking = self.belief.failing_actions().into_iter();
-        let breaking: BTreeSet<ActionHandle> = breaking.map(|(ticket, _)| ticket).collect();
-        let is_lost = |ticket: &ActionHandle| match self.belief.running().get(ticket) {
-            Some(underway) => {
-                breaking.contains(ticket) || !underway.violated_conjuncts().is_empty()
-            }
-            None => true,
-        };
-        self.action_log.open_tickets().filter(is_lost).collect()
+        self.agenda.push(todo);
+        self.wait_and_check_timeouts(until);
     }
 
     /// Requests a plan; see [`Run::process_planner_answer`] for its answer.
     pub(super) fn request_awaited_plan(&mut self, reason: &Reason) -> Result<(), Stop> {
-        if self.is_goal_change_pending() {
+        if self.goals.is_change_pending() {
             return Ok(());
         }
-        if self.is_paused() {
-            self.work_queue.push(PendingStep::Plan(reason.clone()));
+        if self.goals.is_paused() {
+            self.agenda.push(PendingStep::Plan(reason.clone()));
             self.wait_without_executor();
             return Ok(());
         }
-        if let Some((time, verdict)) = &self.search_results.failed_at
-            && *time == self.now
-        {
+        if let Some(verdict) = self.search_results.failure_at(&self.now) {
             return Err(Stop::Ended(verdict.clone()));
         }
         if self.ask_about_doubts(reason) {
@@ -144,11 +114,11 @@ impl Run<'_> {
         let foreseen = self.anticipated_situation(guess);
         let foreseen = foreseen.map(|it| (it.prospect.situation, it.prospect.running));
         let (situation, running) =
-            foreseen.unwrap_or_else(|| self.situation(&self.expected_planning_time, guess));
-        let is_known = |(task, known, before): &(Arc<Task>, Situation, OverrunEstimate)| {
-            Arc::ptr_eq(task, &self.task) && *known == situation && *before == guess
-        };
-        if self.planned_for.as_ref().is_some_and(is_known) {
+            foreseen.unwrap_or_else(|| self.view().situation_after_planning(guess));
+        if self
+            .background
+            .is_planned_for(&self.task, &situation, guess)
+        {
             let why = format!("the executor rejects the plan that exists: {reason}");
             let missing = MissingPlan::Rejected;
             return self.continue_abandoned_plan_or_stop(Verdict::NoPlan { why, missing });
@@ -181,7 +151,7 @@ impl Run<'_> {
             PlanningTime::Measured if self.settings.plans_aside => Rational::ZERO,
             PlanningTime::Measured => planned.seconds.unwrap_or_default(),
         };
-        self.update_expected_planning_time(&took);
+        self.background.update_expected_time(&took);
         let ready = &self.now + &took;
         self.ports.recorder.record(&Entry::Planned {
             now: &ready,
@@ -193,12 +163,13 @@ impl Run<'_> {
             remark: planned.remark.as_deref(),
             shortfall: &planned.shortfall,
         });
-        self.note_shortfall(&self.goals(), &planned.shortfall);
+        let goals = self.goals.open();
+        self.goals.note_shortfall(&goals, &planned.shortfall);
         self.check_stop_request()?;
         if attempt.is_optional {
             match planned.answer {
-                PlanAnswer::Plan(plan) => self.prepare_better_plan(attempt, &plan),
-                answer => self.note_no_better_plan(&answer),
+                PlanAnswer::Plan(plan) => self.prepare_better_plan(attempt, plan),
+                answer => self.search_results.note_no_better_plan(&answer),
             }
             return Ok(());
         }
@@ -208,8 +179,9 @@ impl Run<'_> {
                 return Ok(());
             }
             PlanAnswer::Plan(plan) => {
-                let task = Arc::clone(&self.task);
-                self.planned_for = Some((task, attempt.situation.clone(), attempt.guess));
+                let (situation, guess) = (&attempt.situation, attempt.guess);
+                self.background
+                    .note_planned_for(&self.task, situation, guess);
                 plan
             }
             answer => {
@@ -230,20 +202,17 @@ impl Run<'_> {
         };
         // Actions that end before the adoption belong to neither plan. Their effects are news, and
         // the new plan receives their ends.
-        self.action_log.begin_plan(&BTreeMap::new());
-        self.work_queue
-            .push(PendingStep::Adopt(Box::new(FinishedPlan {
-                plan,
-                situation: attempt.situation,
-                running: attempt.running,
-                ready,
-            })));
+        self.drop_steps();
+        self.agenda.push(PendingStep::Adopt(Box::new(FinishedPlan {
+            course: (plan, attempt.situation, attempt.running),
+            ready,
+        })));
         Ok(())
     }
 
     /// Returns the next attempt after no plan was found with this guess about overdue actions.
     pub(super) fn next_attempt(&self, guess: OverrunEstimate) -> NextAttempt {
-        if !self.settings.monitors_slack || self.overdue().is_empty() {
+        if !self.settings.monitors_slack || self.view().overdue().is_empty() {
             return NextAttempt::ContinuePlan;
         }
         match guess {
@@ -260,71 +229,71 @@ impl Run<'_> {
 
     /// Cancels the overdue actions, which count as failed then, and requests a plan.
     pub(super) fn cancel_overdue(&mut self, reason: Reason) {
-        let overdue = self.overdue();
-        self.work_queue.push(PendingStep::Plan(reason));
-        self.work_queue
+        let overdue = self.view().overdue();
+        self.agenda.push(PendingStep::Plan(reason));
+        self.agenda
             .push(PendingStep::WaitForRunning(Some(overdue.clone())));
-        self.work_queue.push(PendingStep::Cancel(overdue));
-    }
-
-    /// Updates the expected planning time: to the last planning time if that is greater, otherwise
-    /// to no less than half of the previous value. If one long search delayed all later plans, a
-    /// run with frequent new goals would never start anything.
-    pub(super) fn update_expected_planning_time(&mut self, took: &Rational) {
-        let half = &self.expected_planning_time / &Rational::from(2);
-        self.expected_planning_time = half.max(took.clone());
+        self.agenda.push(PendingStep::Cancel(overdue));
     }
 
     /// Adopts a plan when its planning time has passed.
     pub(super) fn adopt(&mut self, made: Box<FinishedPlan>) {
-        if self.is_goal_change_pending() {
+        if self.goals.is_change_pending() {
             // It was made for other goals.
             return;
         }
         if self.now < made.ready {
             let ready = made.ready.clone();
-            self.work_queue.push(PendingStep::Adopt(made));
-            self.work_queue.push(PendingStep::Wait(ready));
+            self.agenda.push(PendingStep::Adopt(made));
+            self.agenda.push(PendingStep::Wait(ready));
             return;
         }
         let surprises = std::mem::take(&mut self.plan_events);
-        self.work_queue.push(PendingStep::ReportNews(surprises));
-        self.adopt_plan(PlanStart::of(&made.plan, &made.situation, &made.running));
+        self.agenda.push(PendingStep::ReportNews(surprises));
+        self.adopt_plan(PlanStart::of(&made.course));
     }
 
-    /// Returns the situation when the new plan can start: after the expected planning time, and ε
-    /// after the last event before that.
-    pub(super) fn situation(
-        &self,
-        allowance: &Rational,
-        guess: OverrunEstimate,
-    ) -> (Situation, Vec<ActionHandle>) {
-        let epsilon = self.task.epsilon();
-        let mut time = &self.now + allowance;
-        // With other goals, the problem is a different one, and is written again for planners that
-        // read files.
-        if self.now.is_positive() || self.action_log.started() > 0 || self.have_goals_changed() {
-            time += epsilon;
-        }
-        if time.is_zero() {
-            return (Situation::initial(&self.task), Vec::new());
-        }
-        self.situation_at(time, guess)
+    /// Returns `true` if the executor could continue with the plan that it abandoned.
+    pub(super) fn may_carry_on(&self) -> bool {
+        self.search_results.has_abandoned_plan()
+            && !self.goals.is_change_pending()
+            && self.ports.executor.may_carry_on()
     }
 
-    /// Returns the situation at this time, or ε after the timed initials that come just before it.
-    pub(super) fn situation_at(
-        &self,
-        time: Rational,
-        guess: OverrunEstimate,
-    ) -> (Situation, Vec<ActionHandle>) {
-        if guess != OverrunEstimate::Cancelled {
-            return situation_at(&self.belief, time, guess);
+    /// Ends the run, because there is no other plan, unless the executor continues with the plan
+    /// that it abandoned.
+    pub(super) fn continue_abandoned_plan_or_stop(&mut self, verdict: Verdict) -> Result<(), Stop> {
+        let abandoned = self.search_results.take_abandoned();
+        let Some(abandoned) = abandoned.filter(|_| !self.goals.is_change_pending()) else {
+            return Err(Stop::Ended(verdict));
+        };
+        if !self.ports.executor.carry_on(&self.now) {
+            return Err(Stop::Ended(verdict));
         }
-        let mut belief = self.belief.clone();
-        for ticket in self.overdue() {
-            belief.stop(ticket);
+        self.ports.recorder.record(&Entry::Kept {
+            now: &self.now,
+            reason: &abandoned.reason,
+        });
+        let (missed, plan) = abandoned.resume(&self.action_log);
+        self.action_log.resume_plan(plan);
+        self.search_results.continue_abandoned(&self.now, verdict);
+        let is_of_a_step =
+            |it: &PlanEvent| matches!(it, PlanEvent::Started { .. } | PlanEvent::Ended { .. });
+        self.plan_events.retain(|it| !is_of_a_step(it));
+        self.plan_events.splice(0..0, missed);
+        Ok(())
+    }
+
+    /// Waits before a plan is requested, if the same action would only be refused again. Returns
+    /// `true` if it waits.
+    pub(super) fn wait_after_refusal(&mut self, reason: &Reason) -> bool {
+        let until = self.refusal_backoff.until.clone();
+        if !self.settings.plans_aside || self.now >= until || self.goals.is_change_pending() {
+            return false;
         }
-        situation_at(&belief, time, guess)
+        self.agenda.push(PendingStep::Replan(reason.clone()));
+        let timeout = self.view().next_timeout();
+        self.wait_and_check_timeouts(timeout.map_or(until.clone(), |timeout| timeout.min(until)));
+        true
     }
 }

@@ -1,14 +1,17 @@
 //! Settings and results of runs.
 
+mod timeout_rule;
+
 use std::fmt;
 use std::str::FromStr;
 
 use elbowroom_num::Rational;
 
-use super::TimeoutRule;
 use super::action_log::ExecutedStep;
 use crate::planning::PlanAnswer;
 use crate::reason::Reason;
+
+pub use timeout_rule::TimeoutRule;
 
 /// Settings of a run.
 #[derive(Clone, Debug, PartialEq)]

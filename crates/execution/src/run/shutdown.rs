@@ -2,31 +2,18 @@
 
 use elbowroom_num::Rational;
 
-use super::work_queue::PendingStep;
-use super::{Next, Report, Run, Stop, Verdict};
+use super::agenda::{Next, PendingStep};
+use super::settings::{Report, Verdict};
+use super::{Run, Stop};
 use crate::event::ActionHandle;
 use crate::executor::PlanEvent;
 use crate::reason::{Cause, Reason, Subject};
 use crate::record::Entry;
 
-/// Time that cancelled actions have to stop at the end of a run, in seconds of the world's clock.
-pub const SHUTDOWN_GRACE: i64 = 5;
-
-/// The closing phase of a run, while running actions are cancelled.
-pub(super) struct Shutdown {
-    verdict: Verdict,
-    dead_end: Vec<Reason>,
-    /// Time at which the run ends at the latest.
-    last: Rational,
-    /// `true` once the world has reported its time. After an interrupted wait, the clock of the run
-    /// may be behind.
-    has_answered: bool,
-}
-
 impl Run<'_> {
     /// Ends the run if that was requested.
     pub(super) fn check_stop_request(&mut self) -> Result<(), Stop> {
-        if !(self.stop_check)() {
+        if !self.closing.is_stop_requested() {
             return Ok(());
         }
         self.ports
@@ -39,16 +26,16 @@ impl Run<'_> {
     /// reached ([`WorldError::is_reachable`](crate::WorldError)) receives no commands. If the world
     /// fails meanwhile, the wait ends, and the verdict is not changed.
     pub(super) fn begin_shutdown(&mut self, stop: Stop) {
-        self.work_queue.clear();
+        self.agenda.clear();
         self.plan_events.clear();
         self.cancel_search();
-        if self.shutdown.is_some() {
+        if self.closing.is_shutting_down() {
             self.conclude();
             return;
         }
         let mut has_left = false;
         let verdict = match stop {
-            Stop::Ended(verdict) if self.becomes_idle_after(&verdict) => {
+            Stop::Ended(verdict) if self.goals.becomes_idle_after(&verdict) => {
                 self.become_idle(&verdict);
                 return;
             }
@@ -65,15 +52,10 @@ impl Run<'_> {
             }
         };
         let dead_end = match verdict {
-            Verdict::Unsolvable if self.is_explaining => self.dead_end(),
+            Verdict::Unsolvable if self.history.is_explaining() => self.dead_end(),
             _ => Vec::new(),
         };
-        self.shutdown = Some(Shutdown {
-            verdict,
-            dead_end,
-            last: &self.now + Rational::from(SHUTDOWN_GRACE),
-            has_answered: false,
-        });
+        self.closing.begin(verdict, dead_end, &self.now);
         let open: Vec<ActionHandle> = self.action_log.open_tickets().collect();
         if has_left || open.is_empty() {
             self.conclude();
@@ -81,17 +63,16 @@ impl Run<'_> {
         }
         self.clock_watchdog.begin_plan();
         // Immediate ends are reported at once.
-        self.work_queue
-            .push(PendingStep::ShutDown(self.now.clone()));
+        self.agenda.push(PendingStep::ShutDown(self.now.clone()));
         let running = open.into_iter();
         let running = running.filter(|ticket| !self.action_log.is_cancelled(*ticket));
-        self.work_queue.push(PendingStep::Cancel(running.collect()));
+        self.agenda.push(PendingStep::Cancel(running.collect()));
     }
 
     /// Waits for the cancelled actions that have not stopped, or ends the run if there are none.
     pub(super) fn continue_shutdown_until(&mut self, until: Rational) {
         if self.action_log.open_tickets().next().is_some() {
-            self.open_request = Some(Next::Wait { until });
+            self.agenda.ask(Next::Wait { until });
         } else {
             self.conclude();
         }
@@ -100,16 +81,8 @@ impl Run<'_> {
     /// Continues after the world's answer to [`Self::close`].
     pub(super) fn continue_shutdown(&mut self) {
         let moves_on = self.clock_watchdog.count_answer(&self.now, self.steps);
-        if let Some(closing) = &mut self.shutdown
-            && !std::mem::replace(&mut closing.has_answered, true)
-        {
-            closing.last = &self.now + Rational::from(SHUTDOWN_GRACE);
-        }
-        match &self.shutdown {
-            Some(closing) if self.now < closing.last && moves_on.is_ok() => {
-                let last = closing.last.clone();
-                self.work_queue.push(PendingStep::ShutDown(last));
-            }
+        match self.closing.note_answer(&self.now) {
+            Some(last) if moves_on.is_ok() => self.agenda.push(PendingStep::ShutDown(last)),
             _ => self.conclude(),
         }
     }
@@ -122,54 +95,45 @@ impl Run<'_> {
             && self.plan_events.iter().any(is_change)
     }
 
+    /// Returns the parts of the goal that can never become true again, and since when.
+    pub(super) fn dead_end(&self) -> Vec<Reason> {
+        let conflict = self.goals.first_conflict(&self.task);
+        let log = &self.action_log;
+        self.history
+            .dead_end(&self.belief, log, &self.now, conflict)
+    }
+
     /// Ends the run, or requests another plan if facts or numbers have changed since the verdict.
     fn conclude(&mut self) {
-        let Some(Shutdown {
-            verdict, dead_end, ..
-        }) = self.shutdown.take()
-        else {
+        let Some((verdict, dead_end)) = self.closing.end() else {
             return;
         };
         if self.is_verdict_outdated(&verdict) {
             let reason = Reason::new(Cause::Surprise).about(Subject::AnyObservation);
-            self.work_queue = vec![PendingStep::Replan(reason)];
+            self.agenda.restart_with(PendingStep::Replan(reason));
             return;
         }
         let report = Report {
             verdict,
             time: self.now.clone(),
-            replans: self.replans,
-            reasons: std::mem::take(&mut self.reasons),
+            replans: self.replans.count(),
+            reasons: self.replans.take_reasons(),
             dead_end,
             starts: self.action_log.started(),
             executed: self.action_log.executed(&self.now),
         };
         self.ports.recorder.record(&Entry::Over(&report));
-        self.report = Some(report);
+        self.closing.finish(report);
     }
 
     /// Continues a run that was over with a new plan from there, if that is permitted. Returns
     /// `true` if it does.
     pub(super) fn reopen(&mut self) -> bool {
-        let Some(left) = self.restarts_left.checked_sub(1) else {
-            return false;
-        };
-        self.restarts_left = left;
-        self.report = None;
-        self.work_queue = vec![PendingStep::Replan(Reason::new(Cause::NewPlan))];
-        true
-    }
-}
-
-impl<'a> Run<'a> {
-    /// Makes the run continue up to `times` times after it was over without its goal
-    /// ([`Verdict::NoPlan`], [`Verdict::PlannerFailed`]): another plan is searched for, from the
-    /// situation at its end. [`Run::run_to_end`] does that by itself.
-    #[must_use]
-    pub fn with_restarts(self, times: usize) -> Run<'a> {
-        Self {
-            restarts_left: times,
-            ..self
+        let is_permitted = self.closing.reopen();
+        if is_permitted {
+            let reason = Reason::new(Cause::NewPlan);
+            self.agenda.restart_with(PendingStep::Replan(reason));
         }
+        is_permitted
     }
 }

@@ -22,6 +22,9 @@ pub enum OverrunEstimate {
     Cancelled,
 }
 
+/// A plan, its initial situation, and the tickets of the actions that are running there.
+pub type StartedPlan = (TimeTriggeredPlan, Situation, Vec<ActionHandle>);
+
 /// Returns the situation at `time`, or ε after timed initials that come just before it, if no
 /// action ends until then; and the tickets of the running actions, in the situation's order.
 pub fn situation_at(

@@ -1,47 +1,21 @@
 //! Interface to the driver: the requests of a run, and the answers.
 
-use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_num::{Rational, work};
 
-use super::work_queue::PendingStep;
-use super::{Report, Run, Stop, Verdict};
-use crate::event::{Command, Observation};
+use super::agenda::Next;
+use super::settings::{Report, Verdict};
+use super::{Run, Stop};
+use crate::event::Observation;
 use crate::reason::{Cause, Reason, Subject};
 use crate::record::Entry;
-use crate::request::{PlanRequest, PrepareRequest, RequestId, Workers};
+use crate::request::Workers;
 use crate::world::{TimeAdvance, World, WorldError};
 
 /// Work units of each decision.
 const DECISION_WORK: u64 = 5_000;
 
-/// The next request of a run to its driver.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Next {
-    /// Send this command to the world; then [`Run::next`] again.
-    Command(Command),
-    /// Wait for an observation, at most until `until`; then [`Run::observe`].
-    Wait {
-        /// On the world's clock.
-        until: Rational,
-    },
-    /// Look at these facts and fluents in the world, if possible; then [`Run::observe_requested`].
-    Look {
-        /// Facts.
-        facts: Vec<FactId>,
-        /// Fluents.
-        fluents: Vec<FluentId>,
-    },
-    /// Make a plan; then [`Run::planned`]. If the run waits for it
-    /// ([`Urgency::Awaited`](crate::Urgency::Awaited)), the request is repeated until then;
-    /// otherwise [`Run::next`] again.
-    Plan(PlanRequest),
-    /// Prepare a plan for the executor; then [`Run::prepared`], likewise.
-    Prepare(PrepareRequest),
-    /// Abandon this request, whose answer is not needed any more; then [`Run::next`] again.
-    Abandon(RequestId),
-    /// The run is over.
-    Over(Report),
-}
+/// Number of ended starts that an executive keeps, for late reports and for its report.
+const MAX_STARTS: usize = 2000;
 
 /// Error: the answer was not requested. [`Run::observe`] answers [`Next::Wait`], and [`Run::observe_requested`]
 /// answers [`Next::Look`].
@@ -112,18 +86,18 @@ impl Run<'_> {
     )]
     pub fn next(&mut self) -> Next {
         loop {
-            if let Some(request) = self.outbox.pop_front() {
+            if let Some(request) = self.agenda.pop_request() {
                 return request;
             }
-            if let Some(report) = &self.report {
+            if let Some(report) = self.closing.report() {
                 return Next::Over(report.clone());
             }
-            if let Some(asked) = &self.open_request {
-                return asked.clone();
+            if let Some(question) = self.agenda.question() {
+                return question.clone();
             }
-            let todo = self.work_queue.pop().unwrap_or(PendingStep::Decide);
+            let step = self.agenda.pop();
             work::spend(DECISION_WORK);
-            match self.perform(todo) {
+            match self.perform(step) {
                 Ok(Some(command)) => return Next::Command(command),
                 Ok(None) => {}
                 Err(stop) => self.begin_shutdown(stop),
@@ -136,7 +110,7 @@ impl Run<'_> {
     /// # Errors
     /// If the run has not requested it. It is ignored then.
     pub fn observe(&mut self, passage: TimeAdvance) -> Result<(), UnexpectedAnswer> {
-        if !matches!(self.open_request, Some(Next::Wait { .. })) {
+        if !self.agenda.is_waiting() {
             let what = "time to pass";
             return Err(UnexpectedAnswer { what });
         }
@@ -152,7 +126,7 @@ impl Run<'_> {
         &mut self,
         observations: Vec<Observation>,
     ) -> Result<(), UnexpectedAnswer> {
-        if !matches!(self.open_request, Some(Next::Look { .. })) {
+        if !matches!(self.agenda.question(), Some(Next::Look { .. })) {
             let what = "a look";
             return Err(UnexpectedAnswer { what });
         }
@@ -162,9 +136,8 @@ impl Run<'_> {
 
     /// Records that the world has failed. The run does not ask it anything more.
     pub fn fail(&mut self, error: WorldError) {
-        self.open_request = None;
-        self.pending = None;
-        if self.report.is_none() {
+        self.agenda.close_question();
+        if self.closing.report().is_none() {
             self.begin_shutdown(Stop::WorldFailed(error));
         }
     }
@@ -176,7 +149,7 @@ impl Run<'_> {
 
     /// Processes the world's answer to [`Next::Wait`].
     fn process_time_advance(&mut self, mut passage: TimeAdvance) {
-        let Some(Next::Wait { until }) = self.open_request.take() else {
+        let Some(Next::Wait { until }) = self.agenda.take_question() else {
             return;
         };
         if is_equal_up_to_rounding(&passage.now, &until) {
@@ -184,7 +157,7 @@ impl Run<'_> {
         }
         passage
             .observations
-            .extend(self.take_arrived_answers(&passage.now));
+            .extend(self.background.arrived_answers(&passage.now));
         self.ports.recorder.record(&Entry::Passed {
             until: &until,
             now: &passage.now,
@@ -198,9 +171,20 @@ impl Run<'_> {
         }
     }
 
+    /// Forgets the distant past of an executive, so that its memory does not grow with the length
+    /// of the run.
+    fn prune_history(&mut self) {
+        if self.goals.is_executive() {
+            let log = &self.action_log;
+            self.history.prune(&self.belief, log, &self.now);
+            self.replans.prune();
+            self.action_log.forget_earliest(MAX_STARTS);
+        }
+    }
+
     /// Processes the passage of time, apart from the observations.
     fn finish_time_advance(&mut self) -> Result<(), Stop> {
-        if self.shutdown.is_some() {
+        if self.closing.is_shutting_down() {
             self.continue_shutdown();
             return Ok(());
         }
@@ -214,7 +198,7 @@ impl Run<'_> {
 
     /// Processes the world's answer to [`Next::Look`].
     fn process_look(&mut self, observations: Vec<Observation>) {
-        self.open_request = None;
+        self.agenda.take_question();
         self.ports.recorder.record(&Entry::Looked {
             now: &self.now,
             observations: &observations,
@@ -227,10 +211,10 @@ impl Run<'_> {
 
     fn finish_look(&mut self) -> Result<(), Stop> {
         self.check_stop_request()?;
-        if std::mem::take(&mut self.search_results.inquiry.is_open) {
+        if self.search_results.end_inquiry() {
             return Ok(());
         }
-        if self.is_goal_change_pending() {
+        if self.goals.is_change_pending() {
             return Ok(());
         }
         if self.is_goal_certain() {

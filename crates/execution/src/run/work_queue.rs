@@ -1,68 +1,18 @@
-//! Agenda of a run: the tasks before the next decision of its executor.
+//! The steps before the next decision of the executor.
 
-use std::sync::Arc;
-
+use elbowroom_model::Situation;
 use elbowroom_model::validate::{self, Verdict, validate};
-use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
+use super::agenda::{Next, PendingStep};
 use super::plan_start::{PlanStart, preparation_failure};
-use super::snapshot::PlanAdoption;
-use super::{Next, Run, Stop};
-use crate::event::{ActionHandle, Command};
-use crate::executor::{PlanEvent, PreparedPlan};
+use super::{Run, Stop};
+use crate::event::Command;
 use crate::preparation::PrepareError;
 use crate::reason::{Cause, Reason};
 
-/// A task. All tasks are instantaneous in the world, except for [`PendingStep::Wait`] and [`PendingStep::Close`].
-pub(super) enum PendingStep {
-    /// Begin with this plan, or make one.
-    Begin(Option<TimeTriggeredPlan>),
-    /// Ask the executor for a decision.
-    Decide,
-    /// Cancel actions.
-    Cancel(Vec<ActionHandle>),
-    /// Send a recorded command to the world.
-    Send(Command),
-    /// Wait until then.
-    Wait(Rational),
-    /// Warn of time-outs, and cancel the actions that have reached theirs.
-    CheckTimeouts,
-    /// Cancel an action that timed out then, or end the wait for one that was cancelled.
-    TimeOut(ActionHandle, Rational),
-    /// Wait until these actions have ended; `None` for all actions.
-    WaitForRunning(Option<Vec<ActionHandle>>),
-    /// Wait until these actions have ended, or until the goals or the number of doubts change.
-    WaitForActions(Vec<ActionHandle>, usize),
-    /// Decide how to continue without the plan.
-    Replan(Reason),
-    /// Make a plan from the present situation.
-    Plan(Reason),
-    /// Begin with a plan when its planning time has passed.
-    Adopt(Box<FinishedPlan>),
-    /// Begin with a prepared plan.
-    AdoptPrepared(Box<PreparedPlan>),
-    /// Begin with a plan that another run has begun with, for this task.
-    RestoreAdoption(Arc<Task>, Box<PlanAdoption>),
-    /// Report events that happened while the plan was made, and that it does not account for.
-    ReportNews(Vec<PlanEvent>),
-    /// Wait until then for cancelled actions to stop, and end the run.
-    ShutDown(Rational),
-}
-
-/// A finished plan.
-pub(super) struct FinishedPlan {
-    pub(super) plan: TimeTriggeredPlan,
-    /// The initial situation of the plan.
-    pub(super) situation: Situation,
-    /// The actions running there.
-    pub(super) running: Vec<ActionHandle>,
-    /// The end of its planning time, on the world's clock.
-    pub(super) ready: Rational,
-}
-
 impl Run<'_> {
-    /// Performs a task, which may add more tasks. Returns a command that the world must receive
+    /// Performs a step, which may add more steps. Returns a command that the world must receive
     /// before anything else is done.
     pub(super) fn perform(&mut self, todo: PendingStep) -> Result<Option<Command>, Stop> {
         match todo {
@@ -70,12 +20,11 @@ impl Run<'_> {
                 // A given plan is not shifted, unlike the remaining steps of a late plan.
                 let verdict = validate(&self.task, &plan, &validate::Settings::default());
                 if let Verdict::Invalid(violation) = verdict {
-                    return Err(preparation_failure(&PrepareError::Invalid(Box::new(
-                        violation,
-                    ))));
+                    let error = PrepareError::Invalid(Box::new(violation));
+                    return Err(Stop::Ended(preparation_failure(&error)));
                 }
                 let situation = Situation::initial(&self.task);
-                self.adopt_plan(PlanStart::of(&plan, &situation, &[]));
+                self.adopt_plan(PlanStart::of(&(plan, situation, Vec::new())));
             }
             PendingStep::Begin(None) => self.replan(&Reason::new(Cause::NewPlan))?,
             PendingStep::Decide => self.decide_and_enqueue()?,
@@ -83,10 +32,13 @@ impl Run<'_> {
             PendingStep::Send(command) => return Ok(Some(command)),
             PendingStep::Wait(until) => {
                 let limit = Some(self.settings.time_limit.clone());
-                let changes = [self.next_deadline_of_a_goal(), self.next_release()];
+                let changes = [
+                    self.goals.next_deadline(&self.now),
+                    self.goals.next_release(&self.now),
+                ];
                 let limits = limit.into_iter().chain(changes.into_iter().flatten());
                 let until = limits.fold(until, Rational::min);
-                self.open_request = Some(Next::Wait { until });
+                self.agenda.ask(Next::Wait { until });
             }
             PendingStep::CheckTimeouts => self.check_timeouts(),
             PendingStep::TimeOut(ticket, since) => self.time_out(ticket, since),
@@ -97,7 +49,7 @@ impl Run<'_> {
             PendingStep::Adopt(made) => self.adopt(made),
             PendingStep::AdoptPrepared(mission) => self.begin_prepared_plan(&mission)?,
             PendingStep::RestoreAdoption(task, it) => {
-                self.work_queue
+                self.agenda
                     .push(PendingStep::ReportNews(it.plan_events.clone()));
                 let course = PlanStart {
                     plan: &it.plan,

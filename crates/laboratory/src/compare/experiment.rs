@@ -10,12 +10,13 @@ use elbowroom_execution::executors::ExecutorSpec;
 use elbowroom_execution::run::{RunSettings, TimeoutRule};
 use elbowroom_num::Rational;
 use elbowroom_plan::parametrize::VarySpec;
-use elbowroom_text::{Diagnostic, Diagnostics, Severity, Source, Span};
+use elbowroom_text::{Source, Span};
 use indexmap::IndexMap;
 use serde::Deserialize;
 use serde_json::{Value, json};
 use toml::Spanned;
 
+use crate::error::ExperimentError;
 use file::{File, exact, text_of};
 
 /// Experiment, with the texts of all files that it names.
@@ -119,23 +120,6 @@ pub struct Published {
     /// Mean number of new plans in successful runs; NaN if there were none.
     #[serde(default)]
     pub replans: Vec<f64>,
-}
-
-/// Error in an experiment.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum ExperimentError {
-    /// The file is invalid, or one that it names.
-    #[error("{0}")]
-    Text(Diagnostics),
-    /// Another error.
-    #[error("{0}")]
-    Other(String),
-}
-
-impl ExperimentError {
-    pub(crate) fn other(message: impl Into<String>) -> Self {
-        Self::Other(message.into())
-    }
 }
 
 impl Experiment {
@@ -253,8 +237,7 @@ impl Experiment {
         let source = source.into();
         let wrong = |at: Span, message: String| {
             let message = message.trim().replace('\n', " ");
-            let found = Diagnostic::new(Severity::Error, &source, at, message);
-            ExperimentError::Text(found.into())
+            ExperimentError::at(&source, at, message)
         };
         let read: File = elbowroom_text::toml::read(&source)
             .map_err(|found| ExperimentError::Text(found.into()))?;

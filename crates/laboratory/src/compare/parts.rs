@@ -2,7 +2,10 @@
 
 use std::collections::BTreeSet;
 
+use serde::de::DeserializeOwned;
 use serde_json::Value;
+
+use crate::error::ExperimentError;
 
 /// Results of one or several parts of an experiment.
 pub(crate) trait Partial: Clone {
@@ -12,28 +15,59 @@ pub(crate) trait Partial: Clone {
     fn has_shape_of(&self, other: &Self) -> bool;
     /// Returns the number of parts, and the positions of those in these results.
     fn parts(&mut self) -> (&mut u64, &mut Vec<u64>);
+    /// Checks results that were read.
+    fn check(&self) -> Result<(), ExperimentError>;
     /// Adds the counts of another part.
     fn add(&mut self, other: &Self);
+}
+
+/// Reads results as JSON.
+///
+/// # Errors
+/// The text does not contain results of this format.
+pub(crate) fn read<P: Partial + DeserializeOwned>(text: &str) -> Result<P, ExperimentError> {
+    let results: P = serde_json::from_str(text)
+        .map_err(|error| ExperimentError::other(format!("no results: {error}")))?;
+    results.check()?;
+    Ok(results)
+}
+
+/// Checks the format of results, and that these parts exist.
+pub(crate) fn check(
+    (format, version): (&str, u64),
+    known: &str,
+    (shards, parts): (u64, &[u64]),
+) -> Result<(), ExperimentError> {
+    if format != known || version != 1 {
+        let message = format!("this program reads {known}, version 1");
+        return Err(ExperimentError::other(message));
+    }
+    if !are_valid_parts(shards, parts) {
+        return Err(ExperimentError::other("these parts do not exist"));
+    }
+    Ok(())
 }
 
 /// Merges parts of one experiment.
 ///
 /// # Errors
-/// They belong to different experiments, or a part occurs twice. The text is for the user.
-pub(crate) fn merge_parts<P: Partial>(parts: &[P]) -> Result<P, String> {
+/// They belong to different experiments, or a part occurs twice.
+pub(crate) fn merge_parts<P: Partial>(parts: &[P]) -> Result<P, ExperimentError> {
     let Some((first, rest)) = parts.split_first() else {
-        return Err("there are no results to merge".to_owned());
+        return Err(ExperimentError::other("there are no results to merge"));
     };
     let mut whole = first.clone();
     for part in rest {
         if part.origin() != whole.origin() || !part.has_shape_of(&whole) {
-            return Err("these are parts of different experiments".to_owned());
+            let message = "these are parts of different experiments";
+            return Err(ExperimentError::other(message));
         }
         whole.add(part);
         let mut part = part.clone();
         let (theirs, mine) = (part.parts().1, whole.parts().1);
         if let Some(twice) = theirs.iter().find(|shard| mine.contains(shard)) {
-            return Err(format!("part {twice} is given twice"));
+            let message = format!("part {twice} is given twice");
+            return Err(ExperimentError::other(message));
         }
         mine.append(theirs);
     }

@@ -59,7 +59,8 @@ impl Results {
     }
 }
 
-fn share(of: Proportion) -> Option<Point> {
+/// Returns a share in percent, with Wilson's interval.
+pub(crate) fn share(of: Proportion) -> Option<Point> {
     Some(Point {
         value: 100.0 * of.share()?,
         interval: of
@@ -68,7 +69,8 @@ fn share(of: Proportion) -> Option<Point> {
     })
 }
 
-fn mean(of: Mean) -> Option<Point> {
+/// Returns a mean without an interval.
+pub(crate) fn mean(of: Mean) -> Option<Point> {
     of.value().map(|value| Point {
         value,
         interval: None,

@@ -14,6 +14,7 @@ use super::initial_plans::{self, FirstPlanNote};
 use super::optimum::{self, ColumnOptimum};
 use super::parts::{self, Partial, fingerprint};
 use super::{Experiment, Failures, Part, TrialId};
+use crate::error::ExperimentError;
 
 /// Counts by row and column. All counts are sums, so parts add up exactly, in any order.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -113,11 +114,6 @@ pub struct DiscordantTrials {
     pub only_this: u64,
 }
 
-/// Results that cannot be read, or that do not belong together.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{0}")]
-pub struct ResultsError(String);
-
 const FORMAT: &str = "elbowroom-results";
 
 impl Results {
@@ -151,25 +147,8 @@ impl Results {
     ///
     /// # Errors
     /// The text does not contain results.
-    pub fn read(text: &str) -> Result<Self, ResultsError> {
-        let results: Self = serde_json::from_str(text)
-            .map_err(|error| ResultsError(format!("no results: {error}")))?;
-        if results.format != FORMAT || results.version != 1 {
-            return Err(ResultsError(
-                "this program reads elbowroom-results, version 1".to_owned(),
-            ));
-        }
-        let (height, width) = (results.rows.len(), results.columns.len());
-        let cells: Vec<usize> = results.cells.iter().map(Vec::len).collect();
-        let pairs: Vec<usize> = results.pairs.iter().map(Vec::len).collect();
-        let is_for_all = results.optimum.is_empty() || results.optimum.len() == width;
-        if cells != vec![width; height] || pairs != cells || !is_for_all {
-            return Err(ResultsError("rows and columns do not fit".to_owned()));
-        }
-        if !parts::are_valid_parts(results.shards, &results.parts) {
-            return Err(ResultsError("these parts do not exist".to_owned()));
-        }
-        Ok(results)
+    pub fn read(text: &str) -> Result<Self, ExperimentError> {
+        parts::read(text)
     }
 
     /// Returns the results as JSON.
@@ -191,8 +170,8 @@ impl Results {
     ///
     /// # Errors
     /// They belong to different experiments, or a part occurs twice.
-    pub fn merge_results(parts: &[Self]) -> Result<Self, ResultsError> {
-        parts::merge_parts(parts).map_err(ResultsError)
+    pub fn merge_results(parts: &[Self]) -> Result<Self, ExperimentError> {
+        parts::merge_parts(parts)
     }
 
     /// Returns the table: coverage with its 95 % interval, and the mean number of new plans of
@@ -355,6 +334,22 @@ impl Partial for Results {
 
     fn parts(&mut self) -> (&mut u64, &mut Vec<u64>) {
         (&mut self.shards, &mut self.parts)
+    }
+
+    fn check(&self) -> Result<(), ExperimentError> {
+        let (height, width) = (self.rows.len(), self.columns.len());
+        let cells: Vec<usize> = self.cells.iter().map(Vec::len).collect();
+        let pairs: Vec<usize> = self.pairs.iter().map(Vec::len).collect();
+        let is_for_all = self.optimum.is_empty() || self.optimum.len() == width;
+        parts::check(
+            (&self.format, self.version),
+            FORMAT,
+            (self.shards, &self.parts),
+        )?;
+        if cells != vec![width; height] || pairs != cells || !is_for_all {
+            return Err(ExperimentError::other("rows and columns do not fit"));
+        }
+        Ok(())
     }
 
     fn add(&mut self, other: &Self) {

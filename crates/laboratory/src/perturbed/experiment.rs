@@ -2,11 +2,12 @@
 
 use std::collections::BTreeMap;
 
+use crate::error::ExperimentError;
 use crate::untimed::ExecutorName;
 use crate::worlds::Perturbation;
 use elbowroom_model::Task;
 use elbowroom_model::problem::PredicateId;
-use elbowroom_text::{Diagnostic, Diagnostics, Severity, Source, Span};
+use elbowroom_text::{Source, Span};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use toml::Spanned;
@@ -155,7 +156,7 @@ impl PerturbationNames {
     ///
     /// # Errors
     /// The domain has no predicate of that name.
-    pub fn find(&self, task: &Task) -> Result<Perturbation, PerturbedError> {
+    pub fn find(&self, task: &Task) -> Result<Perturbation, ExperimentError> {
         let count = u32::try_from(task.problem().predicates.len()).unwrap_or(u32::MAX);
         let find = |name: &str| {
             let is_it = |id: &PredicateId| {
@@ -163,7 +164,7 @@ impl PerturbationNames {
                 predicate.name.eq_ignore_ascii_case(name)
             };
             (0..count).map(PredicateId).find(is_it).ok_or_else(|| {
-                PerturbedError::other(format!(
+                ExperimentError::other(format!(
                     "[perturbation] names `{name}`, which is not a predicate of the domain"
                 ))
             })
@@ -172,29 +173,6 @@ impl PerturbationNames {
             achieved: find(&self.achieved)?,
             needed: find(&self.needed)?,
         })
-    }
-}
-
-/// Error in an experiment.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum PerturbedError {
-    /// The file is invalid, or one that it names.
-    #[error("{0}")]
-    Text(Diagnostics),
-    /// Another error.
-    #[error("{0}")]
-    Other(String),
-}
-
-impl PerturbedError {
-    pub(crate) fn other(message: impl Into<String>) -> Self {
-        Self::Other(message.into())
-    }
-
-    /// Creates an error at a place in the file.
-    fn at(source: &Source, span: Span, message: impl Into<String>) -> Self {
-        let found = Diagnostic::new(Severity::Error, source, span, message);
-        Self::Text(found.into())
     }
 }
 
@@ -315,10 +293,10 @@ impl PerturbedExperiment {
     pub fn read(
         source: impl Into<Source>,
         file: &dyn Fn(&str) -> Result<String, String>,
-    ) -> Result<Self, PerturbedError> {
+    ) -> Result<Self, ExperimentError> {
         let source = source.into();
         let read = parsed(&source)?;
-        let wrong = |span: Span, message: &str| PerturbedError::at(&source, span, message);
+        let wrong = |span: Span, message: &str| ExperimentError::at(&source, span, message);
         if read.trials == 0 || read.worlds.is_empty() || read.executors.is_empty() {
             return Err(wrong(
                 read.format.span(),
@@ -364,24 +342,24 @@ impl PerturbedExperiment {
     fn read_included(
         source: &Source,
         file: &dyn Fn(&str) -> Result<String, String>,
-    ) -> Result<Vec<Case>, PerturbedError> {
+    ) -> Result<Vec<Case>, ExperimentError> {
         let read = parsed(source)?;
         if let Some(name) = read.include.first() {
             let message = "a file that is included cannot include others";
-            return Err(PerturbedError::at(source, name.span(), message));
+            return Err(ExperimentError::at(source, name.span(), message));
         }
         own_cases(source, &read, file)
     }
 }
 
 /// Parses the file, and checks its version.
-fn parsed(source: &Source) -> Result<File, PerturbedError> {
+fn parsed(source: &Source) -> Result<File, ExperimentError> {
     let read: File =
-        elbowroom_text::toml::read(source).map_err(|found| PerturbedError::Text(found.into()))?;
+        elbowroom_text::toml::read(source).map_err(|found| ExperimentError::Text(found.into()))?;
     if *read.version.get_ref() != 1 {
         let version = read.version.get_ref();
         let message = format!("unknown version {version}; this program reads version 1");
-        return Err(PerturbedError::at(source, read.version.span(), message));
+        return Err(ExperimentError::at(source, read.version.span(), message));
     }
     Ok(read)
 }
@@ -391,8 +369,8 @@ fn read_named(
     source: &Source,
     name: &Spanned<String>,
     file: &dyn Fn(&str) -> Result<String, String>,
-) -> Result<String, PerturbedError> {
-    file(name.get_ref()).map_err(|error| PerturbedError::at(source, name.span(), error))
+) -> Result<String, ExperimentError> {
+    file(name.get_ref()).map_err(|error| ExperimentError::at(source, name.span(), error))
 }
 
 /// Reads the cases of a file itself, with the files that it names.
@@ -400,10 +378,10 @@ fn own_cases(
     source: &Source,
     read: &File,
     file: &dyn Fn(&str) -> Result<String, String>,
-) -> Result<Vec<Case>, PerturbedError> {
+) -> Result<Vec<Case>, ExperimentError> {
     let given = |name: &Option<Spanned<String>>, what: &str| match name {
         Some(name) => read_named(source, name, file),
-        None => Err(PerturbedError::at(
+        None => Err(ExperimentError::at(
             source,
             read.format.span(),
             format!("there are cases, but `{what}` is missing"),

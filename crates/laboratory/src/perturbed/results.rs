@@ -6,9 +6,10 @@ use crate::untimed::Trial;
 use elbowroom_report::statistics::{Mean, Proportion};
 use serde::{Deserialize, Serialize};
 
-use super::{Case, OptimumRules, PerturbedError, PerturbedExperiment, WorldKind};
+use super::{Case, OptimumRules, PerturbedExperiment, WorldKind};
 use crate::compare::parts::{self, Partial, fingerprint};
 use crate::compare::{Failure, Failures, Part, TrialId};
+use crate::error::ExperimentError;
 use crate::untimed::{ActionName, ExecutorName, StepKind};
 
 /// Counts by case, world and executor. All counts are sums, so parts add up exactly, in any order.
@@ -55,18 +56,8 @@ impl PerturbedResults {
     ///
     /// # Errors
     /// The text does not contain results.
-    pub fn read(text: &str) -> Result<Self, PerturbedError> {
-        let results: Self = serde_json::from_str(text)
-            .map_err(|error| PerturbedError::other(format!("no results: {error}")))?;
-        if results.format != FORMAT || results.version != 1 {
-            return Err(PerturbedError::other(format!(
-                "this program reads {FORMAT}, version 1"
-            )));
-        }
-        if !parts::are_valid_parts(results.shards, &results.parts) {
-            return Err(PerturbedError::other("these parts do not exist"));
-        }
-        Ok(results)
+    pub fn read(text: &str) -> Result<Self, ExperimentError> {
+        parts::read(text)
     }
 
     /// Returns the results as JSON.
@@ -83,8 +74,8 @@ impl PerturbedResults {
     ///
     /// # Errors
     /// They belong to different experiments, or a part occurs twice.
-    pub fn merge_results(parts: &[Self]) -> Result<Self, PerturbedError> {
-        parts::merge_parts(parts).map_err(PerturbedError::other)
+    pub fn merge_results(parts: &[Self]) -> Result<Self, ExperimentError> {
+        parts::merge_parts(parts)
     }
 }
 
@@ -102,6 +93,11 @@ impl Partial for PerturbedResults {
 
     fn parts(&mut self) -> (&mut u64, &mut Vec<u64>) {
         (&mut self.shards, &mut self.parts)
+    }
+
+    fn check(&self) -> Result<(), ExperimentError> {
+        let parts = (self.shards, &self.parts[..]);
+        parts::check((&self.format, self.version), FORMAT, parts)
     }
 
     fn add(&mut self, other: &Self) {

@@ -4,7 +4,7 @@ use elbowroom_model::Task;
 use elbowroom_model::ground::FactId;
 use serde::{Deserialize, Serialize};
 
-use super::{PerturbedError, Setting, WorldKind};
+use super::{ExperimentError, Setting, WorldKind};
 use crate::untimed::{Entry, ExecutorName, StepKind, StepRecord};
 
 const FORMAT: &str = "elbowroom-course";
@@ -102,14 +102,14 @@ impl StoredTrial {
     ///
     /// # Errors
     /// The text does not hold the course of a trial.
-    pub fn read(text: &str) -> Result<Self, PerturbedError> {
+    pub fn read(text: &str) -> Result<Self, ExperimentError> {
         let course: Self = serde_json::from_str(text)
-            .map_err(|error| PerturbedError::other(format!("not a stored trial: {error}")))?;
+            .map_err(|error| ExperimentError::other(format!("not a stored trial: {error}")))?;
         if course.format == FORMAT && course.version == 1 {
             Ok(course)
         } else {
             let reads = format!("this program reads {FORMAT}, version 1");
-            Err(PerturbedError::other(reads))
+            Err(ExperimentError::other(reads))
         }
     }
 }

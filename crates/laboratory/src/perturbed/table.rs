@@ -5,6 +5,7 @@ use elbowroom_report::statistics::{Mean, Proportion};
 use elbowroom_report::table::Table;
 
 use crate::compare::parts;
+use crate::compare::plots::{mean, share};
 
 use super::{OptimumRules, PerturbedResults, Row, WorldKind};
 use crate::untimed::ExecutorName;
@@ -166,12 +167,6 @@ pub fn plots(results: &PerturbedResults) -> Vec<(String, IntervalPlot)> {
     worlds.sort_unstable();
     worlds.dedup();
     let of_world = |world: WorldKind| {
-        let mean = |mean: Mean| {
-            mean.value().map(|value| Point {
-                value,
-                interval: None,
-            })
-        };
         let success = |row: &Row| share(row.success);
         let actions = |work: super::Work| {
             // Messages and failed starts are counted in the same trials.
@@ -252,14 +247,6 @@ fn picture(
         groups,
         reference: None,
     }
-}
-
-/// Returns a share in percent, with Wilson's interval.
-fn share(of: Proportion) -> Option<Point> {
-    Some(Point {
-        value: 100.0 * of.share()?,
-        interval: of.wilson().map(|(a, b)| (100.0 * a, 100.0 * b)),
-    })
 }
 
 /// Returns the published results of each executor.

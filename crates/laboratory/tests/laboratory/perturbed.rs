@@ -225,7 +225,7 @@ fn parts_add_up(experiment: &PerturbedExperiment, trials: u64) -> PerturbedResul
 fn results_are_independent_of_threads_and_parts() {
     let whole = parts_add_up(&experiment("olisipo_sf3.toml"), 21);
     for (name, plot) in perturbed::plots(&whole) {
-        assert!(plot.svg().unwrap().contains("SF3 p10"), "{name}");
+        assert!(plot.svg().contains("SF3 p10"), "{name}");
     }
 }
 

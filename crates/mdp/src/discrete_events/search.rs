@@ -2,14 +2,13 @@
 //! in the order of their examination.
 
 use super::cells;
-use crate::cell_probabilities::CellProbabilities;
+use crate::cell_probabilities::{CellProbabilities, cell_probabilities_of, step};
+use crate::graph;
 use crate::lower_bound::{DecisionEpochs, LowerBound};
 use crate::process::world::TimedWorld;
 use crate::restricted_policy::fitting;
+use crate::settings::{Grid, NotTabulated, ROUNDING_MARGIN, Settings, Side, Stop};
 use crate::upper_bound::UpperBound;
-use crate::{
-    Grid, NotTabulated, ROUNDING_MARGIN, Settings, Side, Stop, cell_probabilities_of, graph, step,
-};
 
 /// Bounds from both sides, with the restricted agent behind the lower one.
 pub(crate) struct FoundBounds {

@@ -1,4 +1,4 @@
-//! Parts of the world: conditions, starts and ends, actions, and events.
+//! Parts of the world: conditions, starts and ends, actions, failures, and events.
 
 use std::sync::Arc;
 
@@ -6,9 +6,10 @@ use elbowroom_model::ground::Action;
 use elbowroom_num::Rational;
 use elbowroom_sim::{Distribution, Rule, Side, WorldModel};
 
-use super::failures::FailureKind;
 use super::value_intervals::{Amount, Span};
-use super::world::Facts;
+
+/// A set of true facts.
+pub type Facts = u128;
 
 /// A condition on facts.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -61,6 +62,29 @@ pub struct ActionModel {
     pub(crate) may_be_cancelled: bool,
     /// `true` if starting it as soon as possible is always optimal.
     pub(crate) is_eager: bool,
+}
+
+/// An outcome of a failure.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FailureKind {
+    /// Conditional probability of this outcome, given that the action fails.
+    pub(crate) share: f64,
+    /// The added facts, without deleted ones.
+    pub adds: Facts,
+    /// The deleted facts.
+    pub deletes: Facts,
+    /// Time in seconds for which the action continues to run after the failure; it cannot be
+    /// cancelled then.
+    pub delay: f64,
+}
+
+/// The end of an action.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(crate) enum Ending {
+    /// Success, with this draw of the amounts.
+    Success(u16),
+    /// Failure, with this outcome.
+    Failure(u8),
 }
 
 /// An event of the world.
@@ -200,7 +224,39 @@ impl Event {
     }
 }
 
+impl FailureKind {
+    pub(crate) fn apply(&self, facts: Facts) -> Facts {
+        (facts & !self.deletes) | self.adds
+    }
+}
+
 impl ActionModel {
+    /// Returns all facts that a failure may make true.
+    pub(crate) fn adds_by_failing(&self) -> Facts {
+        let failures = self.failures.iter();
+        failures.fold(0, |all, failed| all | failed.adds)
+    }
+
+    /// Returns all facts that a failure may make false.
+    pub(crate) fn deletes_by_failing(&self) -> Facts {
+        let failures = self.failures.iter();
+        failures.fold(0, |all, failed| all | failed.deletes)
+    }
+
+    /// Returns the outcome of the failure, if it is one.
+    pub(crate) fn failed(&self, ending: Ending) -> Option<&FailureKind> {
+        match ending {
+            Ending::Success(_) => None,
+            Ending::Failure(way) => self.failures.get(usize::from(way)),
+        }
+    }
+
+    /// Returns `true` if it may have failed already while it is still running, so that it cannot be
+    /// cancelled.
+    pub(crate) fn can_delay_its_failure(&self) -> bool {
+        self.failures.iter().any(|failed| failed.delay > 0.0)
+    }
+
     /// Returns `true` if the end of the action alone satisfies the goal.
     pub(crate) fn achieves_goal(&self, goal: &Needs) -> bool {
         self.rest.iter().any(|(_, end)| goal.holds(end.adds))

@@ -9,7 +9,7 @@ use elbowroom_model::reachability::{self, Answer};
 use elbowroom_num::Rational;
 use elbowroom_sim::{ExogenousChange, FactOutcome, WorldModel};
 
-use crate::{NotTabulated, Settings};
+use crate::settings::{NotTabulated, Settings};
 
 /// Returns all requested actions that can start, under any events. An action that can never end is
 /// in no plan, but the effects of its start may be useful.

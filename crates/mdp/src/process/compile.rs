@@ -12,11 +12,10 @@ use elbowroom_model::{Footprint, Task};
 use elbowroom_num::Rational;
 use elbowroom_sim::{Distribution, ExogenousChange, FailureTime, WorldModel};
 
-use super::action_model::{ActionModel, Event, Needs, Occurs, Snap};
+use super::action_model::{ActionModel, Event, Facts, Needs, Occurs, Snap};
 use super::applicable::facts_changed_by_failures;
 use super::value_intervals::{Amount, ChangeOperator, ChangeValue, Number, Test, units};
-use super::world::Facts;
-use crate::NotTabulated;
+use crate::settings::NotTabulated;
 
 /// Returns the facts and numbers that the goal depends on, through all actions and their failures.
 fn relevant(

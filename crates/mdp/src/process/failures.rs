@@ -1,68 +1,10 @@
-//! Failures of actions, and their outcomes.
+//! Compilation of the outcomes of failures.
 
 use elbowroom_sim::{FactOutcome, FailureRule, FailureTime, Outcome, WorldModel};
 
-use super::action_model::{ActionModel, Snap};
+use super::action_model::{Facts, FailureKind, Snap};
 use super::compile::Compiler;
-use super::world::Facts;
-use crate::NotTabulated;
-
-/// An outcome of a failure.
-#[derive(Clone, Debug, PartialEq)]
-pub struct FailureKind {
-    /// Conditional probability of this outcome, given that the action fails.
-    pub(crate) share: f64,
-    /// The added facts, without deleted ones.
-    pub adds: Facts,
-    /// The deleted facts.
-    pub deletes: Facts,
-    /// Time in seconds for which the action continues to run after the failure; it cannot be
-    /// cancelled then.
-    pub delay: f64,
-}
-
-/// The end of an action.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub(crate) enum Ending {
-    /// Success, with this draw of the amounts.
-    Success(u16),
-    /// Failure, with this outcome.
-    Failure(u8),
-}
-
-impl FailureKind {
-    pub(crate) fn apply(&self, facts: Facts) -> Facts {
-        (facts & !self.deletes) | self.adds
-    }
-}
-
-impl ActionModel {
-    /// Returns all facts that a failure may make true.
-    pub(crate) fn adds_by_failing(&self) -> Facts {
-        let failures = self.failures.iter();
-        failures.fold(0, |all, failed| all | failed.adds)
-    }
-
-    /// Returns all facts that a failure may make false.
-    pub(crate) fn deletes_by_failing(&self) -> Facts {
-        let failures = self.failures.iter();
-        failures.fold(0, |all, failed| all | failed.deletes)
-    }
-
-    /// Returns the outcome of the failure, if it is one.
-    pub(crate) fn failed(&self, ending: Ending) -> Option<&FailureKind> {
-        match ending {
-            Ending::Success(_) => None,
-            Ending::Failure(way) => self.failures.get(usize::from(way)),
-        }
-    }
-
-    /// Returns `true` if it may have failed already while it is still running, so that it cannot be
-    /// cancelled.
-    pub(crate) fn can_delay_its_failure(&self) -> bool {
-        self.failures.iter().any(|failed| failed.delay > 0.0)
-    }
-}
+use crate::settings::NotTabulated;
 
 /// Maximum number of outcomes of an action's failures.
 const MOST_WAYS: usize = 64;

@@ -2,25 +2,20 @@
 //!
 //! A condition that compares a number is an additional fact. In the upper bound it holds if some of
 //! the values satisfy it, in the lower bound if all do. Amounts drawn at an action's end are
-//! divided into intervals where they decide a condition (`breakpoints`).
-
-mod breakpoints;
+//! divided into intervals where they decide a condition (`numbers`).
 
 use elbowroom_model::ground::FluentId;
 use elbowroom_model::problem::Comparison;
 use elbowroom_num::Rational;
 use elbowroom_sim::Rule;
 
-use super::action_model::Snap;
-use super::world::Facts;
-use super::world::TimedWorld;
-use crate::Side;
+use crate::settings::Side;
 
 /// Units per 1: numbers are stored in millionths.
-const UNIT: i64 = 1_000_000;
+pub(super) const UNIT: i64 = 1_000_000;
 
 /// Bound, in millionths, beyond which a number counts as infinite.
-const INFINITE: i64 = 1 << 60;
+pub(super) const INFINITE: i64 = 1 << 60;
 
 /// A closed interval of values, in millionths.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -35,9 +30,9 @@ pub(crate) struct Number {
     pub(crate) fluent: FluentId,
     pub(crate) initial: Span,
     /// Values that are distinguished from larger ones, in order.
-    edges: Vec<i64>,
+    pub(super) edges: Vec<i64>,
     /// Values that are represented exactly: only constant amounts lead to them.
-    known: Vec<i64>,
+    pub(super) known: Vec<i64>,
 }
 
 /// A comparison, represented as a fact.
@@ -102,7 +97,7 @@ impl Span {
 
     /// Returns the smallest interval around a value that may lie between two whole numbers of
     /// millionths.
-    fn around(value: &Rational) -> Option<Self> {
+    pub(super) fn around(value: &Rational) -> Option<Self> {
         let all = value * &Rational::from(UNIT);
         let (low, _) = all.floor().as_small()?;
         let (high, _) = all.ceil().as_small()?;
@@ -167,7 +162,7 @@ impl Test {
     }
 
     /// Returns `true` if it holds for some of the values (above), or for all (below).
-    fn holds(self, span: Span, side: Side) -> bool {
+    pub(super) fn holds(self, span: Span, side: Side) -> bool {
         let bound = self.bound;
         match side {
             Side::Above => match self.comparison {
@@ -181,7 +176,7 @@ impl Test {
     }
 
     /// Returns the values after which its truth changes.
-    fn edges(self) -> Vec<i64> {
+    pub(super) fn edges(self) -> Vec<i64> {
         match self.comparison {
             ComparisonOperator::AtMost => vec![self.bound],
             ComparisonOperator::AtLeast => vec![self.bound - 1],
@@ -204,7 +199,7 @@ impl Number {
 
     /// Widens an interval to all values that need not be distinguished from it. A single value that
     /// is represented exactly stays.
-    fn widened(&self, span: Span) -> Span {
+    pub(super) fn widened(&self, span: Span) -> Span {
         if span.low == span.high && self.known.binary_search(&span.low).is_ok() {
             return span;
         }
@@ -249,58 +244,12 @@ impl Amount {
         matches!(self.by, ChangeValue::Random { .. })
     }
 
-    fn apply_to(&self, number: &Number, before: Span, by: Span) -> Span {
+    pub(super) fn apply_to(&self, number: &Number, before: Span, by: Span) -> Span {
         let after = match self.change {
             ChangeOperator::Set => by,
             ChangeOperator::Add => before.plus(by),
             ChangeOperator::Subtract => before.plus(by.negated()),
         };
         number.widened(after)
-    }
-}
-
-impl TimedWorld {
-    /// Returns the facts together with the comparisons that hold for the numbers, for this side.
-    pub(crate) fn with_tests(&self, facts: Facts, numbers: &[Span], side: Side) -> Facts {
-        let tests = self.tests.iter().enumerate();
-        let holding = tests.filter(|(_, test)| test.holds(numbers[test.number], side));
-        let first = self.facts.len();
-        holding.fold(facts & !self.tested, |all, (place, _)| {
-            all | 1 << (first + place)
-        })
-    }
-
-    /// Applies the changes of a happening to numbers, with the given draw.
-    pub(crate) fn apply_changes(&self, numbers: &mut [Span], snap: &Snap, draw: usize) {
-        for (amount, by) in snap.amounts.iter().zip(&snap.draws[draw].1) {
-            let number = amount.number;
-            numbers[number] = amount.apply_to(&self.numbers[number], numbers[number], *by);
-        }
-    }
-
-    /// Returns the possible intervals of numbers with these values in a state, the most exact
-    /// first.
-    pub(crate) fn spans_of(&self, values: &[Rational]) -> Option<Vec<Vec<Span>>> {
-        let mut all = vec![Vec::new()];
-        for (number, value) in self.numbers.iter().zip(values) {
-            let span = Span::around(value)?;
-            let mut ways = vec![number.widened(span)];
-            if ways[0].low == ways[0].high {
-                let wider = Number {
-                    known: Vec::new(),
-                    ..number.clone()
-                };
-                ways.push(wider.widened(span));
-            }
-            let longer = all.iter().flat_map(|before: &Vec<Span>| {
-                ways.iter().map(move |way| {
-                    let mut longer = before.clone();
-                    longer.push(*way);
-                    longer
-                })
-            });
-            all = longer.collect();
-        }
-        Some(all)
     }
 }

@@ -4,15 +4,11 @@ use elbowroom_model::Task;
 use elbowroom_model::ground::FactId;
 use elbowroom_sim::{Side, WorldModel};
 
-use super::action_model::{ActionModel, Event, Needs, Occurs};
+use super::action_model::{ActionModel, Ending, Event, Facts, Needs, Occurs};
 use super::applicable::actions;
 use super::compile::Compiler;
-use super::failures::Ending;
 use super::value_intervals::{Number, Span, Test};
-use crate::{NotTabulated, Settings, Side as Bounding};
-
-/// A set of true facts.
-pub type Facts = u128;
+use crate::settings::{NotTabulated, Settings, Side as Bounding};
 
 /// A task in a world, as a semi-Markov decision process: see the [crate](crate).
 #[derive(Clone, Debug)]

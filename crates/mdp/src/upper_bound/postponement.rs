@@ -1,9 +1,8 @@
 //! Check whether an end may be better after another happening: [`may_be_better_later`].
 
-use crate::process::action_model::{ActionModel, Needs, Snap};
-use crate::process::failures::{Ending, FailureKind};
+use crate::process::action_model::{ActionModel, Ending, Facts, FailureKind, Needs, Snap};
 use crate::process::value_intervals::Amount;
-use crate::process::world::{Facts, TimedWorld};
+use crate::process::world::TimedWorld;
 
 /// The changes by a happening.
 #[derive(Clone, Copy, Debug, Default)]

@@ -8,12 +8,11 @@
 use indexmap::IndexMap;
 
 use super::postponement::may_be_better_later;
-use crate::Side;
 use crate::cell_probabilities::CellProbabilities;
 use crate::graph::{Choice, Target};
-use crate::process::action_model::ActionModel;
-use crate::process::failures::Ending;
-use crate::process::world::{Facts, TimedWorld};
+use crate::process::action_model::{ActionModel, Ending, Facts};
+use crate::process::world::TimedWorld;
+use crate::settings::Side;
 use crate::state::{Phase, State};
 use crate::upper_bound::{Cell, Moment};
 

@@ -7,15 +7,13 @@
 //!
 //! - *naturally*, if each relaxed plan for the other goes through it,
 //! - *greedy-necessarily*, if every operator that makes the other true for the first time also
-//!   needs it (Hoffmann, Porteous & Sebastia, JAIR 22, 2004),
-//! - *reasonably*, if it would have to be undone for the other one otherwise (see `reasonable`).
+//!   needs it (Hoffmann, Porteous & Sebastia, JAIR 22, 2004).
 //!
 //! A landmark is *accepted* when it is true and all landmarks ordered before it were accepted. The
 //! remaining landmarks are those not accepted, and those needed again: they are false, although the
 //! goal or a remaining landmark needs them (the landmark-counting heuristic of LAMA; Richter &
 //! Westphal, JAIR 39, 2010).
 
-mod reasonable;
 #[cfg(test)]
 mod tests;
 

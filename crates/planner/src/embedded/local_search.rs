@@ -128,6 +128,7 @@ impl<'a> Refiner<'a> {
     ) -> Self {
         let mut relaxed = Relaxed::new(compiled, compresses);
         relaxed.serves_repairs = true;
+        relaxed.lists_actions = true;
         if let Some(metric) = &compiled.metric {
             relaxed.set_step_costs(&StepCosts::of(compiled, metric));
         }

@@ -12,7 +12,7 @@
 //! in the list of deletions is tried for all actions of a schema, one position after the other.
 
 use super::compile::{Change, Compiled, NONE, Snap};
-use super::formula::{Literal, is_set};
+use super::formula::is_set;
 use super::hash::Map;
 use super::state::State;
 
@@ -70,19 +70,6 @@ impl Mutexes {
             mutexes.groups.push(group);
         }
         mutexes
-    }
-
-    /// Returns `true` if a group shows that two literals are never true together.
-    pub(crate) fn exclude(&self, one: Literal, other: Literal) -> bool {
-        if one.fact() == other.fact() {
-            return one.truth() != other.truth();
-        }
-        let groups = |literal: Literal| &self.of_fact[literal.fact() as usize];
-        one.truth()
-            && other.truth()
-            && groups(one)
-                .iter()
-                .any(|group| groups(other).contains(group))
     }
 }
 
@@ -306,6 +293,8 @@ fn narrow(number: usize) -> u32 {
 
 #[cfg(test)]
 mod tests {
+    use elbowroom_model::Task;
+    use elbowroom_pddl::{Source, read_problem};
     use proptest::prelude::*;
 
     use super::*;
@@ -353,5 +342,45 @@ mod tests {
                 budget > 0
             });
         }
+    }
+
+    const BLOCKS: &str = "(define (domain blocks) (:requirements :typing :durative-actions)
+        (:types block)
+        (:predicates (on ?x ?y - block) (clear ?x - block) (table ?x - block) (held ?x - block) (free))
+        (:durative-action take :parameters (?x - block) :duration (= ?duration 1)
+          :condition (and (at start (clear ?x)) (at start (table ?x)) (at start (free)))
+          :effect (and (at start (not (clear ?x))) (at start (not (table ?x))) (at start (not (free)))
+                       (at end (held ?x))))
+        (:durative-action stack :parameters (?x ?y - block) :duration (= ?duration 1)
+          :condition (and (at start (held ?x)) (at start (clear ?y)))
+          :effect (and (at start (not (held ?x))) (at start (not (clear ?y)))
+                       (at end (clear ?x)) (at end (free)) (at end (on ?x ?y)))))";
+
+    /// A block is on the table, held or below another block.
+    #[test]
+    fn states_of_block_are_mutex_group() {
+        let problem = "(define (problem p) (:domain blocks) (:objects a b c - block)
+            (:init (clear a) (clear b) (clear c) (table a) (table b) (table c) (free))
+            (:goal (and (on a b) (on b c))))";
+        let sources = [("domain", BLOCKS), ("problem", problem)]
+            .map(|(name, text)| Source::new(name, text.to_owned()));
+        let Ok((problem, _)) = read_problem(&sources[0], &sources[1]) else {
+            panic!("a problem that can be read");
+        };
+        let task = Task::new(problem);
+        let compiled = &compiled(&task);
+        let root = root(compiled);
+        let mutexes = Mutexes::of(compiled, &root, u64::MAX);
+        let facts = |group: &Vec<u32>| {
+            let facts = group
+                .iter()
+                .filter_map(|&atom| compiled.facts.get(atom as usize));
+            let mut facts: Vec<String> = facts.map(|&fact| task.fact_name(fact)).collect();
+            facts.sort();
+            facts
+        };
+        let groups: Vec<Vec<String>> = mutexes.groups.iter().map(facts).collect();
+        let around_b = ["(clear b)", "(held b)", "(on a b)"];
+        assert!(groups.iter().any(|group| *group == around_b), "{groups:?}");
     }
 }

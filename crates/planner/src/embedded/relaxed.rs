@@ -16,6 +16,7 @@ mod labels;
 mod numbers;
 mod plan;
 mod resources;
+mod subgoal;
 #[cfg(test)]
 mod tests;
 
@@ -43,6 +44,7 @@ pub(crate) use labels::Labels;
 pub(crate) use plan::OVERDRAWN;
 use resources::Resources;
 pub(crate) use resources::reservoirs;
+pub(crate) use subgoal::Subgoal;
 
 /// Upper limit of costs.
 const MOST: u32 = 1 << 15;
@@ -90,12 +92,16 @@ pub(crate) struct Relaxed<'a> {
     operator_cost: Vec<u32>,
     /// Cost of each operator.
     own_cost: Vec<u32>,
+    /// Cost of each operator in estimates for a subgoal.
+    subgoal_cost: Vec<u32>,
     /// The effects of each operator.
     reaches: Vec<Reaches>,
     is_used: Vec<bool>,
     is_wanted: Vec<bool>,
     gaps: Vec<f64>,
     buckets: Vec<Vec<u32>>,
+    /// The cost up to which costs were propagated.
+    propagated_cost: usize,
     applicable: Vec<u32>,
     deadlines: Deadlines,
     resources: Resources,
@@ -106,8 +112,10 @@ pub(crate) struct Relaxed<'a> {
     pub(crate) is_chronological: bool,
     /// `true` if estimates list the literals that their relaxed plans achieve.
     pub(crate) lists_subgoals: bool,
+    /// `true` if estimates list the actions of their relaxed plans.
+    pub(crate) lists_actions: bool,
     /// `true` for repairs: an estimate stops when the whole goal is reached, so that not all
-    /// applicable steps are listed, and lists the actions of its relaxed plan.
+    /// applicable steps are listed.
     pub(crate) serves_repairs: bool,
 }
 
@@ -142,16 +150,19 @@ impl<'a> Relaxed<'a> {
             missing: Vec::with_capacity(operators),
             operator_cost: vec![0; operators],
             own_cost: own_costs(&graph),
+            subgoal_cost: Vec::new(),
             reaches: graph.operators.iter().map(Reaches::of).collect(),
             is_used: vec![false; operators],
             is_wanted: vec![false; propositions],
             gaps: vec![0.0; compiled.tests.len()],
             buckets: Vec::new(),
+            propagated_cost: 0,
             applicable: Vec::new(),
             deadlines: Deadlines::default(),
             horizon: NEVER,
             is_chronological: false,
             lists_subgoals: false,
+            lists_actions: false,
             serves_repairs: false,
             graph,
         }
@@ -219,7 +230,7 @@ impl<'a> Relaxed<'a> {
         if instances.count() != 1 {
             return false;
         }
-        self.prepare(state);
+        self.prepare(state, None);
         let end = self.compiled.snap(self.compiled.action(action).end);
         let is_true = |cost: &[u32]| end.adds.iter().any(|&f| cost[2 * f as usize] != UNREACHED);
         if is_true(&self.cost) {
@@ -227,7 +238,8 @@ impl<'a> Relaxed<'a> {
             return false;
         }
         self.missing[self.graph.end_of[action as usize] as usize] += 1;
-        self.propagate_costs(state, self.serves_repairs);
+        self.propagate_costs(state, self.serves_repairs, None);
+        self.buckets.iter_mut().for_each(Vec::clear);
         !is_true(&self.cost)
     }
 
@@ -273,16 +285,21 @@ impl<'a> Relaxed<'a> {
 
     /// Returns the estimate, or `None` if even the relaxed goal is unreachable.
     pub(crate) fn evaluate(&mut self, state: &State) -> Option<Estimate> {
-        if !self.prepare(state) {
-            self.buckets.iter_mut().for_each(Vec::clear);
+        let estimate = self.evaluate_goals(state, None);
+        self.buckets.iter_mut().for_each(Vec::clear);
+        estimate
+    }
+
+    fn evaluate_goals(&mut self, state: &State, subgoal: Option<&Subgoal>) -> Option<Estimate> {
+        if !self.prepare(state, subgoal) {
             return None;
         }
-        // Without separate ends, costs above those of the goal do not change the relaxed plan. Resources and
-        // consumables need the costs of other operators.
-        let asks_for_others = self.graph.has_single_starts
-            || !self.resources.is_empty()
-            || !self.consumables.is_empty();
-        self.propagate_costs(state, self.serves_repairs || !asks_for_others);
+        // Without separate ends, costs above those of the goal do not change the relaxed plan.
+        // Consumables need the costs of other operators.
+        let asks_for_others =
+            self.graph.has_single_starts && subgoal.is_none() || !self.consumables.is_empty();
+        let stops_early = self.serves_repairs || !asks_for_others;
+        self.propagate_costs(state, stops_early, subgoal);
         let mut estimate = Estimate::default();
         for open in &state.open {
             let end = self.graph.end_of[open.action as usize];
@@ -290,16 +307,9 @@ impl<'a> Relaxed<'a> {
                 return None;
             }
         }
-        if self
-            .graph
-            .goal
-            .iter()
-            .any(|&goal| self.cost[goal as usize] == UNREACHED)
-        {
-            return None;
-        }
-        self.extract(state, &mut estimate);
-        if state.timed < self.compiled.timed_until_goal {
+        let wanted = self.wanted_goals(subgoal)?;
+        self.extract(state, wanted, &mut estimate);
+        if state.timed < self.compiled.timed_until_goal && subgoal.is_none() {
             self.await_timed(state, &mut estimate);
         }
         self.list_applicable(state, &mut estimate);
@@ -309,7 +319,7 @@ impl<'a> Relaxed<'a> {
     /// Returns the applicable steps without an estimate, or `None` if the running actions cannot
     /// end in time, according to incomplete checks.
     pub(crate) fn list(&mut self, state: &State) -> Option<Estimate> {
-        let is_in_time = self.prepare(state);
+        let is_in_time = self.prepare(state, None);
         if is_in_time {
             self.propagate_zero_costs(state);
         }
@@ -321,7 +331,7 @@ impl<'a> Relaxed<'a> {
 
     /// Initializes the costs of the propositions that hold in the state. Returns `false` if some
     /// running action cannot end in time, according to incomplete checks.
-    fn prepare(&mut self, state: &State) -> bool {
+    fn prepare(&mut self, state: &State, subgoal: Option<&Subgoal>) -> bool {
         let mut is_in_time = true;
         let spans = self
             .is_chronological
@@ -338,7 +348,13 @@ impl<'a> Relaxed<'a> {
         let outlasts = |open: &OpenAction| {
             open.most < NEVER && (open.node == SETTLED || self.is_chronological)
         };
-        if self.horizon < NEVER || !self.graph.windows.is_empty() || state.open.iter().any(outlasts)
+        if let Some(subgoal) = subgoal {
+            for &operator in &subgoal.late_operators {
+                self.missing[operator as usize] += 1;
+            }
+        } else if self.horizon < NEVER
+            || !self.graph.windows.is_empty()
+            || state.open.iter().any(outlasts)
         {
             is_in_time = self.deadlines.exclude_late_operators(
                 self.compiled,

@@ -277,12 +277,12 @@ impl<'a> Planner<'a> {
         } else {
             tuning.first_round
         };
-        // If there are reservoirs, the first search replenishes them, and has by far the best
-        // chance.
-        if self.has_reservoirs {
-            return budget;
-        }
-        let most = tuning.first_round_work / (1 + size);
+        let most_work = if self.has_reservoirs {
+            tuning.first_round_work_with_reservoirs
+        } else {
+            tuning.first_round_work
+        };
+        let most = most_work / (1 + size);
         budget.min(most.max(tuning.root_check_after))
     }
 

@@ -17,6 +17,7 @@ mod node;
 mod novelty;
 mod open_list;
 mod runaway;
+mod serialization;
 mod states;
 mod strategy;
 mod successor_list;
@@ -392,12 +393,7 @@ impl<'a> Search<'a> {
         }
         self.evaluated += 1;
         let (accepted, left) = self.remaining_landmarks(parent, &state);
-        let estimate = if self.needs_estimate(parent, left) {
-            self.relaxed.evaluate(&state)
-        } else {
-            self.relaxed.list(&state)
-        };
-        let Some(mut estimate) = estimate else {
+        let Some((mut estimate, agenda, left)) = self.estimate(parent, &state, left) else {
             // Where actions are compressed, the relaxed plan may lack facts that hold only while an
             // action runs.
             self.is_lossy |= self.strategy.compresses.is_some();
@@ -425,6 +421,7 @@ impl<'a> Search<'a> {
             state,
             notes,
         );
+        self.nodes[number as usize].agenda = agenda;
         self.closed_list.push(hash);
         // A goal state may still have useful successors: the validator can reject the plan, and
         // another plan can be better.
@@ -462,6 +459,7 @@ impl<'a> Search<'a> {
             remaining: left,
             accepted,
             progress: NONE,
+            agenda: NONE,
             dead_end: DeadEnd::Unchecked,
             notes,
         });

@@ -26,12 +26,12 @@ pub enum Technique {
     DeadEnds,
     /// Forward and backward `h²` in incomplete searches: spurious actions and dead ends.
     MutexPairs,
-    /// A search that expands novel states first (BFWS(f₂)).
-    Novelty,
     /// A search by the novelty of successors (BFWS(f₅)).
     Width,
     /// Searches that count landmarks.
     Landmarks,
+    /// A search that achieves the conjuncts of the goal one after the other.
+    Serialization,
     /// Searches in chronological order.
     Chronological,
     /// In the relaxed problem, a fact that holds only while an envelope runs does not support
@@ -77,9 +77,9 @@ impl Technique {
         (Self::PreferredOperators, "preferred-operators"),
         (Self::DeadEnds, "dead-ends"),
         (Self::MutexPairs, "mutex-pairs"),
-        (Self::Novelty, "novelty"),
         (Self::Width, "width"),
         (Self::Landmarks, "landmarks"),
+        (Self::Serialization, "serialization"),
         (Self::Chronological, "chronological"),
         (Self::Envelopes, "envelopes"),
         (Self::Macros, "macros"),
@@ -110,8 +110,6 @@ pub enum Member {
     Chronological,
     /// In chronological order, with consumables saved.
     Saving,
-    /// Novelty decides among states of the same estimate (BFWS(f₂)).
-    Novelty,
     /// Novelty of successors decides, and few states are estimated (BFWS(f₅)).
     Width,
     /// The number of remaining landmarks decides first, and then the estimate.
@@ -119,6 +117,11 @@ pub enum Member {
     /// Novelty of successors decides, among those with the same number of remaining landmarks
     /// (BFWS(f₅)).
     LandmarkWidth,
+    /// The conjuncts of the goal are achieved one after the other.
+    Serializing,
+    /// As [`Serializing`](Self::Serializing), with higher costs of steps that must wait for an
+    /// object or a window.
+    Spreading,
     /// A complete search.
     Complete,
 }
@@ -131,10 +134,11 @@ impl Member {
         (Self::Replenishing, "replenishing"),
         (Self::Chronological, "chronological"),
         (Self::Saving, "saving"),
-        (Self::Novelty, "novelty"),
         (Self::Width, "width"),
         (Self::Landmarks, "landmarks"),
         (Self::LandmarkWidth, "landmark-width"),
+        (Self::Serializing, "serializing"),
+        (Self::Spreading, "spreading"),
         (Self::Complete, "complete"),
     ];
 }
@@ -255,12 +259,13 @@ constants! {
     /// that only one of the searches can solve wait less for it, and the total changes little.
     first_round_with_concurrency: u64 = 1_024;
     /// Maximum work of a first round in operators of estimates, so that a large problem, each state
-    /// of which takes long, does not wait for one search. Not used if there are reservoirs: with
-    /// it, the 34th of rovers with numbers (17,410 actions) has no plan within 30 s, without it one
-    /// after 16 s. Measured on parking, 18th of IPC 2014, with 25,215 actions: BFWS(f₅) finds a
+    /// of which takes long, does not wait for one search. Measured on parking, 18th of IPC 2014, with 25,215 actions: BFWS(f₅) finds a
     /// plan after 17 states, but had no turn within 20 s while the first round was limited by
     /// states alone.
     first_round_work: u64 = 20_000_000;
+    /// As `first_round_work`, if there are reservoirs. Less, as the searches that serialize the
+    /// goal come after the first one: a farm with 21,392 actions takes 20 ms for each state.
+    first_round_work_with_reservoirs: u64 = 2_500_000;
     /// A search keeps its turn as long as it finds a better estimate within this number of states.
     /// From machine shop (all instances take one descent of 600 to 1,600 states): with 64, the
     /// largest ones lose their turn on the way. A search that does not compress is also limited by
@@ -270,11 +275,10 @@ constants! {
     /// Number of states of an incomplete search for each one of the complete search. Not measured;
     /// the complete search seldom finds a first plan, but is needed for proofs.
     incomplete_share: u64 = 8;
-    /// Share of a round for BFWS(f₂) without replenishing, if there are reservoirs, relative to
-    /// other searches. From a farm with windows and fuel: no plan in 40 s of processor time with 1,
-    /// one after 284,000 states with 2, after 176,000 with 4. It finds that plan after 77,000
-    /// states of its own.
-    novelty_share: u64 = 4;
+    /// Share of a round for the search that serializes the goal and spreads work, relative to other
+    /// searches before the first plan. Of the searches alone, it solves most generated problems
+    /// with windows and reservoirs first. Not measured otherwise.
+    serialization_share: u64 = 4;
     /// Number of states per search for better plans in its first round. Not measured.
     improving_round: u64 = 4_096;
     /// Time of the search near the best plan for each unit of time of another search. It finds most
@@ -385,13 +389,6 @@ constants! {
     /// for memory.
     most_worths: usize = 4_096;
 
-    /// 1 to order landmarks reasonably, by mutex groups. On every eighth temporal instance of the
-    /// collection, no first plan takes another number of states; of those with required concurrency
-    /// only seven of majsp do: five take more with it (one 3,929 states instead of 596), and two 1
-    /// % fewer.
-    reasonable_orders: u8 = 0;
-    /// Work limit for mutex groups, in parts of operators, about 50 ms. Not measured.
-    most_mutex_work: u64 = 20_000_000;
     /// Work limit for mutex pairs, in words of tables (20 to 40 ms). With 200 million, instances 6 and 10 of turn and open take
     /// 0.06 and 0.33 s instead of 0.04 and 0.22 s, and no other answer differs among those tried. Floor-tile needs less than 5 million.
     most_mutex_pair_work: u64 = 20_000_000;

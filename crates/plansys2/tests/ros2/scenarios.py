@@ -2,9 +2,7 @@
 through `examples/plansys2_world.py`.
 
 `scenarios.py ELBOWROOM ELBOWROOM_PLANSYS2 [SCENARIO...]` needs a shell in which rclpy and plansys2_msgs can be imported;
-`.ci/ros2` makes one. For scenarios named on the command line, all output is shown. Each scenario has a DDS domain of its
-own, so that several can run concurrently. There are no limits on speed: on a slow machine the scenarios take longer, but
-do not fail.
+`.ci/ros2` makes one. For scenarios named on the command line, all output is shown.
 """
 
 import json
@@ -12,20 +10,20 @@ import os
 import signal
 import subprocess
 import sys
-import tempfile
 import threading
 import time
-from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 ROOT = os.path.join(HERE, "..", "..", "..", "..")
+sys.path.insert(0, os.path.join(ROOT, "testing"))
+import ros2_stage  # noqa: E402
+from ros2_stage import PATIENCE, end, play_all  # noqa: E402
+
 ELBOWROOM, PROGRAM = (os.path.abspath(it) for it in sys.argv[1:3])
 PYTHON_WORLD = f"{sys.executable} {os.path.join(ROOT, 'examples', 'plansys2_world.py')}"
 YARD = [os.path.join(HERE, "yard", it) for it in ("domain.pddl", "problem.pddl", "plan.plan")]
 MATCH = [os.path.join(ROOT, "cases", "match", it) for it in ("domain.pddl", "problem.pddl", "plan.plan")]
-# Time limit of each wait, in seconds. Only a hanging process reaches it.
-PATIENCE = 300
-AT_A_TIME = 4
 # Exit codes of a run without a plan: with a certificate that none exists, or without one.
 NO_PLAN = (1, 3)
 DRIVERS = {
@@ -35,17 +33,13 @@ DRIVERS = {
 }
 
 
-class Stage:
-    """Environment of one scenario."""
+class Stage(ros2_stage.Stage):
+    """Environment of one scenario: a world, and performers."""
 
     def __init__(self, world, domain_id, folder):
-        self.world, self.folder = world, folder
-        self.environment = dict(os.environ, ROS_DOMAIN_ID=str(domain_id))
-        self.log_file = os.path.join(folder, "performers.jsonl")
+        super().__init__(domain_id, folder)
+        self.world = world
         self.trace_file = os.path.join(folder, "run.jsonl")
-
-    def start(self, command, **more):
-        return subprocess.Popen(command, env=self.environment, text=True, **more)
 
     def play(self, performers, files, *options, speed=1, interrupt_after=None, command="run"):
         """Runs Elbowroom with these performers until it ends, or interrupts it after the event `interrupt_after`."""
@@ -74,44 +68,11 @@ class Stage:
             end(run, there)
         return self
 
-    def wait_for(self, what, holds, *while_there):
-        """Waits for a condition while the processes that should cause it are running."""
-        until = time.monotonic() + PATIENCE
-        while not holds():
-            for process in while_there:
-                if process.poll() is not None and not holds():
-                    if process.stdout is not None:
-                        self.hear(process)
-                    raise AssertionError(f"waited for {what}, but {process.args[:2]} ended with {process.returncode}")
-            assert time.monotonic() < until, f"waited {PATIENCE} s in vain for {what}"
-            time.sleep(0.05)
-
-    def hear(self, process):
-        """Reads the output of a process until its end."""
-        try:
-            self.out, self.errors = process.communicate(timeout=PATIENCE)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            self.out, self.errors = process.communicate()
-            raise AssertionError(f"{process.args[:2]} has not ended within {PATIENCE} s") from None
-        finally:
-            self.code = process.returncode
-
     def settle(self):
         """Waits until the performers log no more messages."""
         known = None
         while known != (known := self.log()):
             time.sleep(0.5)
-
-    def log(self):
-        if not os.path.exists(self.log_file):
-            return []
-        with open(self.log_file, encoding="utf-8") as file:
-            # The last line may be incomplete.
-            return [json.loads(line) for line in file if line.endswith("\n")]
-
-    def events(self):
-        return [it["event"] for it in self.log()]
 
     def when(self, event, action):
         """Returns the time of an event that must have happened exactly once."""
@@ -121,23 +82,6 @@ class Stage:
     def trace(self):
         with open(self.trace_file, encoding="utf-8") as file:
             return file.read()
-
-    def __str__(self):
-        log = open(self.log_file, encoding="utf-8").read() if os.path.exists(self.log_file) else ""
-        return f"exit code {self.code}\n{self.out}\n{self.errors}\n{log}"
-
-
-def end(*processes):
-    for it in processes:
-        if it is not None and it.poll() is None:
-            it.terminate()
-    for it in processes:
-        if it is not None:
-            try:
-                # Occasionally rclpy does not end after the signal.
-                it.wait(timeout=30)
-            except subprocess.TimeoutExpired:
-                it.kill()
 
 
 def two_robots_at_a_time(stage):
@@ -323,6 +267,25 @@ def a_plan_is_asked_for_and_executed(stage):
     assert stage.events().count("ends") == 3
 
 
+def a_second_executor_of_a_server_refuses(stage):
+    """A server holds the performers until it ends, also between its runs."""
+    crew = {name: dict(it, lasts=5 * it["lasts"]) for name, it in DRIVERS.items()}
+    server = [*stage.world.split(), "serve", "--elbowroom", ELBOWROOM]
+
+    def run_others(client):
+        stage.wait_for("the first start", lambda: "begins" in stage.events(), client)
+        for line in (server, [ELBOWROOM, "run", *YARD, "--world-process", stage.world]):
+            other = stage.start(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+            out, errors = other.communicate(timeout=PATIENCE)
+            assert other.returncode == 2 and "another executor, process" in errors, f"{other.returncode} {out} {errors}"
+
+    said = serve(stage, crew, meanwhile=run_others)
+    assert said["executed"]["outcome"] == "succeeded", "the first server is not disturbed"
+    assert stage.events().count("begins") == 3, "no action was started twice"
+    os.remove(stage.log_file)
+    assert serve(stage, DRIVERS)["executed"]["outcome"] == "succeeded", "the performers are free again"
+
+
 def an_executed_plan_is_cancelled(stage):
     crew = {name: dict(spec, lasts=30) for name, spec in DRIVERS.items()}
     said = serve(stage, crew, "2")
@@ -489,6 +452,7 @@ PROGRAM_ONLY = [
     a_run_tells_the_problem_expert_if_it_is_asked_to,
     a_missing_performer_is_named,
     a_plan_is_asked_for_and_executed,
+    a_second_executor_of_a_server_refuses,
     an_executed_plan_is_cancelled,
     an_executed_plan_fails_with_its_reason,
     a_run_dies_while_a_plan_is_executed,
@@ -508,32 +472,11 @@ BOTH = [
 ]
 
 
-def play(number, scenario, name, world):
-    with tempfile.TemporaryDirectory() as folder:
-        stage = Stage(world, number + 1, folder)
-        begun = time.monotonic()
-        stage.code = stage.out = stage.errors = None
-        try:
-            scenario(stage)
-            went_well, said = True, "ok"
-        except Exception as error:  # each failure is reported with the messages of the scenario
-            went_well = False
-            said = f"WRONG: {type(error).__name__}: {error} at line {error.__traceback__.tb_next.tb_lineno}\n{stage}"
-        if went_well and sys.argv[3:]:
-            said += f"\n{stage}"
-        print(f"{scenario.__name__}, {name}: {said} ({time.monotonic() - begun:.0f} s)", flush=True)
-        return went_well
-
-
 def main():
-    only = sys.argv[3:]
-    plays = [(it, name, world) for it in BOTH for name, world in (("program", PROGRAM), ("Python", PYTHON_WORLD))]
-    plays += [(it, "program", PROGRAM) for it in PROGRAM_ONLY]
-    plays = [it for it in plays if not only or it[0].__name__ in only]
-    with ThreadPoolExecutor(AT_A_TIME) as pool:
-        went_well = list(pool.map(lambda it: play(it[0], *it[1]), enumerate(plays)))
-    print(f"{sum(went_well)} of {len(went_well)} scenarios passed")
-    sys.exit(0 if all(went_well) else 1)
+    worlds = [(", program", PROGRAM), (", Python", PYTHON_WORLD)]
+    plays = [(it, name, partial(Stage, world)) for it in BOTH for name, world in worlds]
+    plays += [(it, ", program", partial(Stage, PROGRAM)) for it in PROGRAM_ONLY]
+    play_all(plays, sys.argv[3:])
 
 
 if __name__ == "__main__":

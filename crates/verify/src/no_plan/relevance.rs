@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use elbowroom_model::Footprint;
 use elbowroom_model::ground::{Action, Body, Condition, FactId, FluentId, SnapAction};
 
+use super::earliest_times::ConditionContext;
 use super::{Instances, ReachedFacts};
 
 impl Instances {
@@ -27,6 +28,7 @@ impl Instances {
             let is_open = !self.is_goal_in_reach(stated);
             let mut relevance = Relevance {
                 instances: self,
+                reached,
                 listed: is_open.then_some(stated),
                 facts: BTreeSet::new(),
                 absences: BTreeSet::new(),
@@ -46,6 +48,8 @@ impl Instances {
 /// Facts and fluents that the goal depends on, found backwards from it.
 struct Relevance<'a> {
     instances: &'a Instances,
+    /// Facts that are within reach with assumed values.
+    reached: &'a ReachedFacts,
     /// If present, only facts that are not listed here are needed: the others are within reach anyway.
     listed: Option<&'a ReachedFacts>,
     /// Facts that conditions mention.
@@ -61,7 +65,12 @@ impl<'a> Relevance<'a> {
     fn contributors(&mut self) -> Vec<&'a Action> {
         let task = &self.instances.task;
         let mut others: Vec<(&Action, Footprint)> = Vec::new();
-        for action in &self.instances.actions {
+        for action in self
+            .instances
+            .actions
+            .iter()
+            .filter(|own| self.can_end(own))
+        {
             let mut footprint = Footprint::of_start(task, action);
             footprint.include(Footprint::of_end(task, action));
             others.push((action, without_restored(action, footprint)));
@@ -83,6 +92,19 @@ impl<'a> Relevance<'a> {
             }
             others = rest;
         }
+    }
+
+    /// Returns `true` unless the over-all condition can never hold. Some domains forbid a move from a place to itself
+    /// in that way. The duration is assumed to be positive, so this does not exclude that a plan contains the action.
+    fn can_end(&self, action: &Action) -> bool {
+        let Body::Durative(body) = &action.body else {
+            return true;
+        };
+        let times = self.instances.earliest_times(self.reached);
+        let now = &self.instances.initial.now;
+        times
+            .next(&body.over_all, now, ConditionContext::All)
+            .is_some()
     }
 
     /// Returns `true` if some needed fact or fluent is changed.

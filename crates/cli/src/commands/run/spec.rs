@@ -76,6 +76,13 @@ pub(in crate::commands) fn of(
         spec.likelihoods = Some((&input::source(path, "likelihoods")?).into());
     }
     let mut names = WorldNames::default();
+    if arguments.spoil.is_some() && !arguments.has_adversary() {
+        let what = "--spoil has no effect without --world spoiler";
+        return Err(Failure::new(
+            what,
+            "add --world spoiler, or leave out --spoil",
+        ));
+    }
     if arguments.has_adversary() {
         if spec.realtime.is_some() && spec.has_plan {
             let what = "--world spoiler cannot run on a wall clock";

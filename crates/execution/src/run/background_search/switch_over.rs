@@ -3,17 +3,33 @@
 use std::sync::Arc;
 
 use elbowroom_model::TimeTriggeredPlan;
-use elbowroom_num::Rational;
 
-use super::super::pending::PreparationFallback;
-use super::super::plan_start::PlanStart;
-use super::super::prediction::ExpectedStart;
-use super::super::{Run, Stop};
-use super::fitting::StartedPlan;
-use super::{BackgroundSearch, ExecutionDuringSearch, MAX_START_REPORT_WAIT};
 use crate::executor::PlanEvent;
+use crate::run::agenda::{PendingStep, PreparationFallback};
+use crate::run::background::BackgroundSearch;
+use crate::run::plan_start::PlanStart;
+use crate::run::situation::{OverrunEstimate, StartedPlan};
+use crate::run::{Run, Stop};
 
 impl Run<'_> {
+    /// Processes a plan that the search has found.
+    pub(super) fn process_found_plan(
+        &mut self,
+        mut search: BackgroundSearch,
+        plan: TimeTriggeredPlan,
+    ) -> Result<(), Stop> {
+        if search.query().guess == OverrunEstimate::Cancelled {
+            self.cancel_overdue(search.query().reason.clone());
+            return Ok(());
+        }
+        search.set_plan(plan.clone(), &self.now);
+        if search.has_abandoned_plan() {
+            return self.switch_from_empty_plan(search, &plan, true);
+        }
+        self.background.set_search(search);
+        Ok(())
+    }
+
     /// Switches to a plan if nothing was started since the plan was requested. If the situation is
     /// not as expected, the plan is fitted to the real one, if possible. Otherwise the events are
     /// reported to the executor, which decides whether the plan is still feasible.
@@ -23,27 +39,28 @@ impl Run<'_> {
         plan: &TimeTriggeredPlan,
         may_fit: bool,
     ) -> Result<(), Stop> {
-        let time = search.situation.time.clone();
-        let (situation, running) = self.situation_at(time, search.guess);
-        let is_as_expected = situation == search.situation && running == search.running;
-        if !is_as_expected
-            && may_fit
-            && let Some(fit) = self.fit_to_present(&search, plan)
+        if may_fit
+            && !self.is_as_expected(&search)
+            && let Some(fit) = search.fit_to_present(plan, &self.view())
         {
             if self.settings.readies_aside {
                 // The fitted plan includes all events so far.
                 self.plan_events.clear();
-                self.begin_preparation(search, fit, true);
-                return Ok(());
             }
-            let (fitted, situation, running) = fit;
-            let course = PlanStart::of(&fitted, &situation, &running);
-            let (task, goals) = (Arc::clone(&search.task), search.goals.clone());
-            let otherwise = PreparationFallback::AdoptUnfitted(Box::new(search), plan.clone());
-            self.await_preparation(&task, &goals, course, otherwise);
+            self.adopt_fitted(search, fit, |search| {
+                PreparationFallback::AdoptUnfitted(Box::new(search), plan.clone())
+            });
             return Ok(());
         }
         self.switch_unfitted(search, plan)
+    }
+
+    /// Returns `true` if the situation from which the plan starts is the present one.
+    fn is_as_expected(&self, search: &BackgroundSearch) -> bool {
+        let query = search.query();
+        let time = query.start.situation.time.clone();
+        let (situation, running) = self.view().situation_at(time, query.guess);
+        situation == query.start.situation && running == query.start.running
     }
 
     /// Switches to the unchanged plan.
@@ -52,28 +69,22 @@ impl Run<'_> {
         search: BackgroundSearch,
         plan: &TimeTriggeredPlan,
     ) -> Result<(), Stop> {
-        let time = search.situation.time.clone();
-        let (situation, running) = self.situation_at(time, search.guess);
-        let is_as_expected = situation == search.situation && running == search.running;
-        let is_known = |ticket| search.running.contains(&ticket);
+        let query = search.query();
+        let start = &query.start;
+        let is_known = |ticket| start.running.contains(&ticket);
         let knows_all = self.action_log.open_tickets().all(is_known);
-        if !is_as_expected && (!knows_all || !search.expected.is_empty()) {
+        if (!knows_all || !start.expected.is_empty()) && !self.is_as_expected(&search) {
             // The plan continues actions that were never started, or does not contain all running
             // actions.
-            return self.search_again(&search.reason);
+            return self.search_again(&query.reason);
         }
+        let as_made = (plan.clone(), start.situation.clone(), start.running.clone());
         if self.settings.readies_aside {
-            let as_made = (
-                plan.clone(),
-                search.situation.clone(),
-                search.running.clone(),
-            );
             self.begin_preparation(search, as_made, false);
             return Ok(());
         }
         self.report_past_events();
-        let course = PlanStart::of(plan, &search.situation, &search.running);
-        self.adopt_plan_for_goals(&search.task, &search.goals, course);
+        self.adopt_plan_for_goals(&query.task, &query.goals, PlanStart::of(&as_made));
         Ok(())
     }
 
@@ -82,63 +93,52 @@ impl Run<'_> {
     pub(super) fn report_past_events(&mut self) {
         let mut surprises = std::mem::take(&mut self.plan_events);
         surprises.retain(|it| !matches!(it, PlanEvent::Started { .. } | PlanEvent::Ended { .. }));
-        self.work_queue
-            .push(super::PendingStep::ReportNews(surprises));
+        self.agenda.push(PendingStep::ReportNews(surprises));
     }
 
-    /// Switches to a finished plan when it is due, or prepares it. Returns `true` if the executor
-    /// makes no decision now.
+    /// Switches to a finished plan when it is due, or prepares it. Without a fit, the plan is
+    /// outdated. Returns `true` if the executor makes no decision now.
     pub(super) fn switch_if_due(&mut self) -> Result<bool, Stop> {
-        let Some(search) = &self.search else {
+        let view = self.view();
+        let due = self
+            .background
+            .search()
+            .filter(|it| it.is_switch_due(&view));
+        let Some((plan, _)) = due.and_then(BackgroundSearch::plan) else {
             return Ok(false);
         };
-        let Some((plan, since)) = &search.plan else {
+        let fit = due.and_then(|search| search.fit_to_present(plan, &view));
+        let Some(search) = self.background.take_search() else {
             return Ok(false);
         };
-        let is_begun = |it: &ExpectedStart| self.action_log.ticket(it.step).is_some();
-        // With background preparation, steps that have not begun are part of the prepared plan.
-        let is_due = self.settings.readies_aside
-            || self.now >= search.situation.time
-            || search.expected.iter().all(is_begun);
-        // A plan cannot include commanded actions whose start has not been reported.
-        let is_told = |ticket| self.belief.running().contains_key(&ticket);
-        let waits_for_word = !self.action_log.open_tickets().all(is_told)
-            && self.now < since + Rational::from(MAX_START_REPORT_WAIT);
-        if search.execution != ExecutionDuringSearch::RunningActionsOnly
-            && (!is_due || waits_for_word)
-        {
-            return Ok(false);
+        match fit {
+            Some(fit) => self.adopt_fitted(search, fit, |search| {
+                if search.is_optional() {
+                    PreparationFallback::ContinuePlan(search.query().reason.clone())
+                } else {
+                    PreparationFallback::SearchAgain(Box::new(search))
+                }
+            }),
+            None => self.search_again(&search.query().reason)?,
         }
-        let fit = self.fit_to_present(search, plan);
-        let Some(search) = self.search.take() else {
-            return Ok(false);
-        };
-        self.switch_to_fitted(search, fit)?;
         Ok(true)
     }
 
-    /// Switches to the fitted plan, or prepares it. Without a fit, the plan is outdated.
-    fn switch_to_fitted(
+    /// Prepares a fitted plan, in the background or at once, and begins with it.
+    fn adopt_fitted(
         &mut self,
         search: BackgroundSearch,
-        fit: Option<StartedPlan>,
-    ) -> Result<(), Stop> {
-        if let Some(fit) = fit {
-            if self.settings.readies_aside {
-                self.begin_preparation(search, fit, true);
-                return Ok(());
-            }
-            let (plan, situation, running) = fit;
-            let course = PlanStart::of(&plan, &situation, &running);
-            let (task, goals) = (Arc::clone(&search.task), search.goals.clone());
-            let otherwise = if search.is_optional() {
-                PreparationFallback::ContinuePlan(search.reason)
-            } else {
-                PreparationFallback::SearchAgain(Box::new(search))
-            };
-            self.await_preparation(&task, &goals, course, otherwise);
-            return Ok(());
+        fit: StartedPlan,
+        fallback: impl FnOnce(BackgroundSearch) -> PreparationFallback,
+    ) {
+        if self.settings.readies_aside {
+            self.begin_preparation(search, fit, true);
+            return;
         }
-        self.search_again(&search.reason)
+        let (task, goals) = (
+            Arc::clone(&search.query().task),
+            search.query().goals.clone(),
+        );
+        self.await_preparation(&task, &goals, PlanStart::of(&fit), fallback(search));
     }
 }

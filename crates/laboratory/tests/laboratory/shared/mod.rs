@@ -1,6 +1,5 @@
 //! Benchmark files next to the repository. Tests that need them print a note and pass if they are
 //! missing.
-#![allow(clippy::print_stdout, reason = "a test that is skipped should say so")]
 
 use std::path::{Path, PathBuf};
 
@@ -8,13 +7,15 @@ use elbowroom_model::Task;
 use elbowroom_num::Rational;
 use elbowroom_pddl::{Source, read_problem};
 
+use crate::skipped::skipped;
+
 /// Returns the folder of benchmark data, if it exists.
 pub(crate) fn data() -> Option<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
     if folder.is_dir() {
         return Some(folder);
     }
-    println!("skipped: there is no {}", folder.display());
+    skipped(format_args!("there is no {}", folder.display()));
     None
 }
 

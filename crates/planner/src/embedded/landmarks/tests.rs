@@ -1,16 +1,12 @@
 //! Compares landmarks with their definition: without the operators that make a landmark true, even
 //! the delete relaxation does not reach the goal.
 
-use elbowroom_model::Task;
-use elbowroom_pddl::{Source, read_problem};
 use proptest::prelude::*;
 
 use super::Landmarks;
 use crate::embedded::apply::Stepper;
 use crate::embedded::compile::{Compiled, Compressibility};
-use crate::embedded::formula::{Literal, is_set};
 use crate::embedded::h2::tests::{Draft, drafts, numeric_drafts};
-use crate::embedded::mutex::Mutexes;
 use crate::embedded::relaxed::{Graph, Labels, Relaxed};
 use crate::embedded::root::root;
 use crate::embedded::search::is_goal;
@@ -114,29 +110,6 @@ fn check_needs(graph: &Graph, labels: &Labels, landmarks: &Landmarks) {
     }
 }
 
-/// Checks that new orders preserve the old ones, form no cycle, and are transitively closed.
-fn check_orders(before: &Landmarks, landmarks: &Landmarks) {
-    let orders = |landmarks: &Landmarks| {
-        let name = |number: u32| landmarks.list[number as usize].proposition;
-        let count = u32::try_from(landmarks.list.len()).expect("few");
-        let mut orders = Vec::new();
-        for later in 0..count {
-            let after = &landmarks.list[later as usize].after;
-            for earlier in (0..count).filter(|&earlier| is_set(after, earlier)) {
-                assert!(earlier < later, "{landmarks:?}");
-                orders.push((name(earlier), name(later)));
-            }
-        }
-        orders
-    };
-    let own = orders(landmarks);
-    assert!(orders(before).iter().all(|order| own.contains(order)));
-    for &(first, middle) in &own {
-        let mut others = own.iter().filter(|order| order.0 == middle);
-        assert!(others.all(|&(_, last)| own.contains(&(first, last))));
-    }
-}
-
 /// Follows all choices within the budget, and checks that no landmark remains where a plan ends.
 fn check_progress(
     compiled: &Compiled,
@@ -183,10 +156,6 @@ fn check(draft: &Draft) {
         if compresses.is_none() {
             check_progress(compiled, &landmarks, (&root, None), 6, &mut 2_000);
         }
-        let mut ordered = landmarks.clone();
-        let mutexes = Mutexes::of(compiled, &root, u64::MAX);
-        ordered.order_reasonably(graph, &labels, &mutexes);
-        check_orders(&landmarks, &ordered);
     }
 }
 
@@ -202,62 +171,4 @@ proptest! {
     fn numeric_landmarks_are_necessary_for_goal(draft in numeric_drafts()) {
         check(&draft);
     }
-}
-
-const BLOCKS: &str = "(define (domain blocks) (:requirements :typing :durative-actions)
-    (:types block)
-    (:predicates (on ?x ?y - block) (clear ?x - block) (table ?x - block) (held ?x - block) (free))
-    (:durative-action take :parameters (?x - block) :duration (= ?duration 1)
-      :condition (and (at start (clear ?x)) (at start (table ?x)) (at start (free)))
-      :effect (and (at start (not (clear ?x))) (at start (not (table ?x))) (at start (not (free)))
-                   (at end (held ?x))))
-    (:durative-action stack :parameters (?x ?y - block) :duration (= ?duration 1)
-      :condition (and (at start (held ?x)) (at start (clear ?y)))
-      :effect (and (at start (not (held ?x))) (at start (not (clear ?y)))
-                   (at end (clear ?x)) (at end (free)) (at end (on ?x ?y)))))";
-
-/// A block can be taken only when it is clear, so a block placed on it too early would have to be
-/// removed again.
-#[test]
-fn landmark_order_builds_tower_bottom_up() {
-    let problem = "(define (problem p) (:domain blocks) (:objects a b c - block)
-        (:init (clear a) (clear b) (clear c) (table a) (table b) (table c) (free))
-        (:goal (and (on a b) (on b c))))";
-    let sources = [("domain", BLOCKS), ("problem", problem)]
-        .map(|(name, text)| Source::new(name, text.to_owned()));
-    let Ok((problem, _)) = read_problem(&sources[0], &sources[1]) else {
-        panic!("a problem that can be read");
-    };
-    let task = Task::new(problem);
-    let compiled = &compiled(&task);
-    let name = |literal: Literal| task.fact_name(compiled.facts[literal.fact() as usize]);
-    let root = root(compiled);
-    let mutexes = Mutexes::of(compiled, &root, u64::MAX);
-    let facts = |group: &Vec<u32>| {
-        let facts = group
-            .iter()
-            .filter_map(|&atom| compiled.facts.get(atom as usize));
-        let mut facts: Vec<String> = facts.map(|&fact| task.fact_name(fact)).collect();
-        facts.sort();
-        facts
-    };
-    let groups: Vec<Vec<String>> = mutexes.groups.iter().map(facts).collect();
-    let around_b = ["(clear b)", "(held b)", "(on a b)"];
-    assert!(groups.iter().any(|group| *group == around_b), "{groups:?}");
-    let mut relaxed = Relaxed::new(compiled, Some(Compressibility::HoldsResource));
-    let labels = labels(&mut relaxed, &root).expect("in time");
-    let graph = relaxed.graph();
-    let mut landmarks = Landmarks::of(graph, &labels, &root.open).expect("reachable");
-    let position = |landmarks: &Landmarks, wanted: &str| {
-        let mut all = landmarks.list.iter();
-        all.position(|landmark| name(Literal(landmark.proposition)) == wanted)
-    };
-    landmarks.order_reasonably(graph, &labels, &mutexes);
-    let low = position(&landmarks, "(on b c)").expect("a goal");
-    let high = position(&landmarks, "(on a b)").expect("a goal");
-    let after = &landmarks.list[high].after;
-    assert!(
-        is_set(after, u32::try_from(low).expect("few")),
-        "{landmarks:?}"
-    );
 }

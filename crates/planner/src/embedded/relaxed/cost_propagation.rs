@@ -2,39 +2,65 @@
 
 use super::super::state::State;
 use super::graph::Kind;
-use super::{MOST, Reaches, Relaxed};
+use super::{MOST, Reaches, Relaxed, Subgoal};
 
 impl Relaxed<'_> {
     /// Runs Dijkstra's algorithm from the propositions that hold. If `stops_early`, it stops once
-    /// the whole goal and the ends of all running actions are reached within the cost processed so
-    /// far. Propositions up to this cost keep their cost and achiever, as do those that they depend
-    /// on. So the relaxed plan is the same, except that the end of an action which nothing else
-    /// needs may be missing.
-    pub(super) fn propagate_costs(&mut self, state: &State, stops_early: bool) {
+    /// the goal, or the part of it, and the ends of all running actions are reached within the cost
+    /// processed so far. Propositions up to this cost keep their cost and achiever, as do those
+    /// that they depend on. So the relaxed plan is the same, except that the end of an action which
+    /// nothing else needs may be missing.
+    pub(super) fn propagate_costs(
+        &mut self,
+        state: &State,
+        stops_early: bool,
+        subgoal: Option<&Subgoal>,
+    ) {
         self.fire_sources(state);
-        let mut cost = 0;
+        self.propagated_cost = 0;
         let mut goals_met = 0;
-        while cost < self.buckets.len() {
+        while self.propagated_cost < self.buckets.len() {
+            let cost = self.propagated_cost;
             let Some(proposition) = self.buckets[cost].pop() else {
-                if stops_early && self.is_goal_within(state, cost, &mut goals_met) {
-                    self.buckets.iter_mut().for_each(Vec::clear);
+                if stops_early && self.is_goal_within(state, subgoal, cost, &mut goals_met) {
                     return;
                 }
-                cost += 1;
+                self.propagated_cost += 1;
                 continue;
             };
             self.reach(proposition, cost);
         }
     }
 
+    /// Continues after an early stop.
+    pub(super) fn propagate_remaining_costs(&mut self) {
+        while self.propagated_cost < self.buckets.len() {
+            match self.buckets[self.propagated_cost].pop() {
+                Some(proposition) => self.reach(proposition, self.propagated_cost),
+                None => self.propagated_cost += 1,
+            }
+        }
+    }
+
     /// Returns `true` if each part of the goal costs at most `cost`, and the ends of all running
     /// actions are reached. The first `met` parts of the goal are known to be within the cost.
-    fn is_goal_within(&self, state: &State, cost: usize, met: &mut usize) -> bool {
-        while let Some(&goal) = self.graph.goal.get(*met) {
-            if self.cost[goal as usize] as usize > cost {
+    fn is_goal_within(
+        &self,
+        state: &State,
+        subgoal: Option<&Subgoal>,
+        cost: usize,
+        met: &mut usize,
+    ) -> bool {
+        let is_within = |goal: u32| self.cost[goal as usize] as usize <= cost;
+        let goals = subgoal.map_or(&self.graph.goal[..], |subgoal| &subgoal.kept);
+        while let Some(&goal) = goals.get(*met) {
+            if !is_within(goal) {
                 return false;
             }
             *met += 1;
+        }
+        if subgoal.is_some_and(|subgoal| !subgoal.candidates.iter().any(|&goal| is_within(goal))) {
+            return false;
         }
         state.open.iter().all(|open| {
             let end = self.graph.end_of[open.action as usize];

@@ -18,7 +18,7 @@ pub(super) struct Deadlines {
     time: Vec<Ticks>,
     missing: Vec<u32>,
     /// The earliest start of each operator; [`NEVER`] while a precondition is missing.
-    earliest_starts: Vec<Ticks>,
+    pub(super) earliest_starts: Vec<Ticks>,
     queue: BinaryHeap<Reverse<(Ticks, u32)>>,
 }
 
@@ -69,6 +69,13 @@ impl Deadlines {
             }
         }
         spans.is_none_or(|spans| self.can_all_end_in_time(graph, state, spans))
+    }
+
+    /// Returns the operators whose conditions were reached, but too late.
+    pub(super) fn late_operators(&self) -> Box<[u32]> {
+        let starts = (0..).zip(self.missing.iter().zip(&self.earliest_starts));
+        let late = starts.filter(|(_, (missing, start))| **missing == 0 && **start >= NEVER);
+        late.map(|(operator, _)| operator).collect()
     }
 
     /// Returns `true` if the end condition of each running action may become true before the action

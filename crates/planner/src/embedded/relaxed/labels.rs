@@ -36,7 +36,7 @@ impl Relaxed<'_> {
     /// Returns initial labels for a state, before the propagation. Returns `None` if the running
     /// actions cannot end in time.
     pub(crate) fn labels(&mut self, state: &State) -> Option<Labels> {
-        let is_in_time = self.prepare(state);
+        let is_in_time = self.prepare(state, None);
         self.buckets.iter_mut().for_each(Vec::clear);
         if !is_in_time {
             return None;

@@ -14,8 +14,7 @@ pub(crate) const OVERDRAWN: u32 = 1 << 20;
 
 impl Relaxed<'_> {
     /// Counts the steps of a relaxed plan, and records its first steps.
-    pub(super) fn extract(&mut self, state: &State, estimate: &mut Estimate) {
-        let mut wanted: Vec<u32> = self.graph.goal.clone();
+    pub(super) fn extract(&mut self, state: &State, mut wanted: Vec<u32>, estimate: &mut Estimate) {
         let mut used: Vec<u32> = Vec::new();
         let mut touched: Vec<u32> = Vec::new();
         for open in &state.open {
@@ -40,10 +39,15 @@ impl Relaxed<'_> {
             let own = self.own_cost[operator as usize];
             estimate.steps += own;
             self.is_used[operator as usize] = false;
-            if self.serves_repairs
-                && let Kind::Start(action) | Kind::Compressed(action) = data.kind
-            {
-                estimate.actions.push(action);
+            if self.lists_actions {
+                match data.kind {
+                    Kind::Start(action) | Kind::Compressed(action) => estimate.actions.push(action),
+                    Kind::Macro(number) => {
+                        let Macro { envelope, content } = self.compiled.macros[number as usize];
+                        estimate.actions.extend([envelope, content]);
+                    }
+                    Kind::End(_) | Kind::Timed(_) | Kind::Axiom => {}
+                }
             }
             let is_next = self.operator_cost[operator as usize] == own;
             let is_next = is_next && !later.contains(&operator);
@@ -186,6 +190,9 @@ impl Relaxed<'_> {
                 self.resources.note(operator, 1);
             }
             noted = used.len();
+            if self.resources.is_short() {
+                self.propagate_remaining_costs();
+            }
             let (missing, costs) = (&self.missing, &self.operator_cost);
             let cost = |o: u32| (missing[o as usize] == 0).then(|| costs[o as usize]);
             let Some(shortage) = self.resources.shortage(cost) else {

@@ -143,6 +143,12 @@ impl Resources {
         }
     }
 
+    /// Returns `true` if a resource runs out that was not reported.
+    pub(super) fn is_short(&self) -> bool {
+        let mut resources = self.remaining.iter().zip(&self.is_settled);
+        resources.any(|(&remaining, &is_settled)| remaining < 0.0 && !is_settled)
+    }
+
     /// Returns an operator that replenishes a resource which runs out. Each resource is reported
     /// once. `cost` returns the cost of a reachable operator.
     pub(super) fn shortage(&mut self, cost: impl Fn(u32) -> Option<u32>) -> Option<Shortage> {

@@ -142,7 +142,9 @@ impl<'a> Planner<'a> {
         for aim in [Aim::CostToGo, Aim::WeightedAStar(3), Aim::WeightedAStar(1)] {
             // One strategy of each compression suffices.
             let compressing = strategies.iter().filter(|strategy| {
-                strategy.compresses.is_some() && strategy.replenishes == self.has_reservoirs
+                strategy.compresses.is_some()
+                    && !strategy.serializes_goals
+                    && strategy.replenishes == self.has_reservoirs
             });
             entrants.extend(compressing.map(|strategy| strategy.with_aim(aim)));
         }

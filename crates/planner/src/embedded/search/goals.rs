@@ -31,6 +31,21 @@ pub(crate) fn is_goal(compiled: &Compiled, state: &State) -> bool {
     }
 }
 
+/// Returns for each conjunct of the goal whether it holds: literals, then tests, then choices.
+pub(super) fn conjuncts(compiled: &Compiled, state: &State) -> impl Iterator<Item = bool> {
+    let goal = &compiled.goal;
+    let passes = |test: u32| state.test_holds(compiled, test, None);
+    let literals = goal.literals.iter().map(|l| l.holds(&state.facts));
+    let tests = goal.tests.iter().map(move |&test| passes(test));
+    let choices = goal.choices.iter().map(move |choice| {
+        let mut passes = passes;
+        choice
+            .iter()
+            .any(|part| part.holds(&state.facts, &mut passes))
+    });
+    literals.chain(tests).chain(choices)
+}
+
 /// Returns `true` if the numbers that remain after the ends of all running actions do not satisfy
 /// the goal.
 pub(super) fn misses_goal(compiled: &Compiled, state: &State) -> bool {

@@ -1,10 +1,9 @@
 //! The landmarks of a search that counts them, and the landmarks that a state lacks.
 
 use super::super::landmarks::Landmarks;
-use super::super::mutex::Mutexes;
 use super::super::relaxed::Labels;
 use super::super::state::State;
-use super::novelty::goals_left;
+use super::goals::conjuncts;
 use super::{Expansion, Search};
 
 /// Work of a turn that searches for landmarks, per unit of the maximum work of an estimate.
@@ -41,14 +40,7 @@ impl Search<'_> {
                     // If all landmarks are goals, they are no better than counting goals.
                     let is_only = self.compiled.tuning.only.is_some();
                     let found = found.filter(|found| found.intermediate_count > 0 || is_only);
-                    found.map(|mut landmarks| {
-                        if self.compiled.tuning.reasonable_orders > 0 {
-                            let most = self.compiled.tuning.most_mutex_work;
-                            let mutexes = Mutexes::of(self.compiled, initial, most);
-                            landmarks.order_reasonably(graph, &labels, &mutexes);
-                        }
-                        SearchLandmarks::Known(landmarks)
-                    })
+                    found.map(SearchLandmarks::Known)
                 } else if work > self.compiled.tuning.most_landmark_work {
                     None
                 } else {
@@ -81,7 +73,10 @@ impl Search<'_> {
             return landmarks.progress(self.compiled, before, state);
         }
         match self.strategy.novelty {
-            Some(_) => (Vec::new(), goals_left(self.compiled, state)),
+            Some(_) => {
+                let left = conjuncts(self.compiled, state).filter(|holds| !holds);
+                (Vec::new(), u32::try_from(left.count()).unwrap_or(u32::MAX))
+            }
             None => (Vec::new(), 0),
         }
     }

@@ -7,6 +7,7 @@ use super::super::hash::Map;
 use super::super::state::Projection;
 use super::novelty::Progress;
 use super::runaway::Drift;
+use super::serialization::Agenda;
 use super::successor_list::QueuedSuccessor;
 
 /// A node. Its state is stored separately, as most searches need little memory for a node.
@@ -20,6 +21,8 @@ pub(super) struct Node {
     pub(super) accepted: u32,
     /// Number of its [progress](SharedNotes::progress), or [`NONE`].
     pub(super) progress: u32,
+    /// Number of its [agenda](SharedNotes::agendas), or [`NONE`].
+    pub(super) agenda: u32,
     pub(super) dead_end: DeadEnd,
     /// `None` if there are no notes.
     pub(super) notes: Option<Box<Notes>>,
@@ -75,6 +78,8 @@ pub(super) struct SharedNotes {
     pub(super) accepted: Shared<Box<[u64]>>,
     /// Progress on the path to a node, in a search by the novelty of successors.
     pub(super) progress: Shared<Progress>,
+    /// The subgoals, in a search that serializes the goal.
+    pub(super) agendas: Shared<Agenda>,
 }
 
 /// Numbered values without duplicates.

@@ -4,14 +4,13 @@
 //! contained: single facts, or pairs. Novel states come first, regardless of their estimate. So a
 //! search leaves plateaus of the estimate.
 //!
-//! This is best-first width search (Lipovetzky & Geffner, AAAI 2017), in two forms. In BFWS(f₂),
-//! the worth of a state is its number of unachieved goals and its estimate. In BFWS(f₅), it is the
-//! number of unachieved goals, and the number of facts of a relaxed plan that were achieved since
-//! this number last decreased. That needs no estimate, except for a relaxed plan where the number
-//! decreases.
+//! This is best-first width search (Lipovetzky & Geffner, AAAI 2017). In BFWS(f₅), the worth of a
+//! state is its number of unachieved goals, and the number of facts of a relaxed plan that were
+//! achieved since this number last decreased. That needs no estimate, except for a relaxed plan
+//! where the number decreases. Where the goal is serialized, the worth is the estimate.
 
 use super::super::compile::Compiled;
-use super::super::formula::{Formula, Literal};
+use super::super::formula::Literal;
 use super::super::hash::Map;
 use super::super::state::State;
 
@@ -85,6 +84,11 @@ impl Novelty {
             relaxed_plan: u32::try_from(self.relaxed_plans.len() - 1).unwrap_or(u32::MAX),
             reached: vec![0; subgoals.len().div_ceil(64)].into(),
         }
+    }
+
+    /// Forgets the facts seen.
+    pub(super) fn forget(&mut self) {
+        self.seen.values_mut().for_each(|seen| seen.fill(0));
     }
 
     fn relaxed_plan(&self, progress: &Progress) -> &[Literal] {
@@ -185,24 +189,6 @@ fn remember(seen: &mut [u64], facts: &[u64]) -> bool {
         *seen |= facts;
     }
     is_new
-}
-
-/// Returns the number of conjuncts of the goal that do not hold.
-pub(super) fn goals_left(compiled: &Compiled, state: &State) -> u32 {
-    let goal: &Formula = &compiled.goal;
-    let literals = goal.literals.iter().filter(|l| !l.holds(&state.facts));
-    let tests = goal
-        .tests
-        .iter()
-        .filter(|&&test| !state.test_holds(compiled, test, None));
-    let choices = goal.choices.iter().filter(|choice| {
-        let mut passes = |test: u32| state.test_holds(compiled, test, None);
-        !choice
-            .iter()
-            .any(|part| part.holds(&state.facts, &mut passes))
-    });
-    let left = literals.count() + tests.count() + choices.count();
-    u32::try_from(left).unwrap_or(u32::MAX)
 }
 
 #[cfg(test)]

@@ -22,12 +22,17 @@ pub(crate) struct Strategy {
     /// `true` if later choices happen no earlier. The latest ends of the running actions are then
     /// known. Some plans are lost.
     pub(crate) is_chronological: bool,
-    /// If present, novel states come first, and then states with more goals achieved. The value
-    /// selects whether the novelty of each successor or of each expanded state is computed.
+    /// If present, novel states come first, among those with the same subgoal if the goal is
+    /// serialized. The value selects whether the novelty of each successor or of each expanded
+    /// state is computed.
     pub(crate) novelty: Option<NoveltyOf>,
     /// `true` if the number of remaining landmarks has priority over the estimate, or counts as the
     /// number of remaining goals.
     pub(crate) counts_landmarks: bool,
+    /// `true` if the conjuncts of the goal are achieved one after the other.
+    pub(crate) serializes_goals: bool,
+    /// `true` if subgoals prefer objects that are free early.
+    pub(crate) spreads_work: bool,
     /// `true` if relaxed plans account for consumables, which are never replenished.
     pub(crate) draws_on_consumables: bool,
     /// `true` if consumables are saved.
@@ -50,8 +55,7 @@ pub(crate) struct Strategy {
 /// States whose novelty a search computes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum NoveltyOf {
-    /// The expanded states, among those with the same number of goals and the same estimate
-    /// (BFWS(f₂); Lipovetzky & Geffner, AAAI 2017).
+    /// The expanded states, among those with the same subgoal and the same estimate.
     Expanded,
     /// Each successor, among those with the same number of goals and achieved literals of a relaxed
     /// plan (BFWS(f₅)). States are estimated only if they have one more goal.
@@ -84,6 +88,8 @@ impl Strategy {
         saves_consumables: false,
         novelty: None,
         counts_landmarks: false,
+        serializes_goals: false,
+        spreads_work: false,
         replenishes: false,
         joins: false,
         counts_steps: false,
@@ -116,12 +122,6 @@ impl Strategy {
                 saves_consumables: true,
                 ..Self::COMPLETE
             },
-            Member::Novelty => Self {
-                novelty: Some(NoveltyOf::Expanded),
-                draws_on_consumables: false,
-                uses_macros,
-                ..Self::of(Member::Compressing, tuning)
-            },
             Member::Width => Self {
                 novelty: Some(NoveltyOf::Successors),
                 draws_on_consumables: false,
@@ -132,6 +132,17 @@ impl Strategy {
                 counts_landmarks: true,
                 uses_macros,
                 ..Self::of(Member::Compressing, tuning)
+            },
+            Member::Serializing => Self {
+                serializes_goals: true,
+                novelty: Some(NoveltyOf::Expanded),
+                replenishes: tuning.uses(Technique::Reservoirs),
+                uses_macros,
+                ..Self::of(Member::Compressing, tuning)
+            },
+            Member::Spreading => Self {
+                spreads_work: true,
+                ..Self::of(Member::Serializing, tuning)
             },
             Member::LandmarkWidth => Self {
                 counts_landmarks: true,
@@ -161,6 +172,7 @@ impl Strategy {
         if self.replenishes {
             relaxed.count_resources();
         }
+        relaxed.lists_actions = self.serializes_goals;
         relaxed.lists_subgoals = self.novelty == Some(NoveltyOf::Successors);
         relaxed
     }
@@ -180,6 +192,12 @@ impl Strategy {
     /// itself.
     pub(crate) fn alternates(&self) -> bool {
         self.compresses.is_some() && self.novelty.is_none() && self.aim == Aim::Goal
+    }
+
+    /// Returns `true` if the number of remaining landmarks or conjuncts has priority over the
+    /// estimate.
+    pub(super) fn ranks_remaining(&self) -> bool {
+        self.counts_landmarks || self.serializes_goals
     }
 
     /// Returns `true` if it loses no plans, except as

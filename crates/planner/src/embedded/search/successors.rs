@@ -1,10 +1,11 @@
 //! Generation and ordering of the successors of a state.
 
 use super::super::apply::Step;
-use super::super::compile::NONE;
+use super::super::compile;
 use super::super::relaxed::{Estimate, OVERDRAWN};
 use super::super::state::State;
 use super::super::time::NEVER;
+use super::node::NONE;
 use super::novelty::Progress;
 use super::successor_list::QueuedSuccessor;
 use super::{Aim, NoveltyOf, ROOT, Search};
@@ -17,7 +18,7 @@ impl Search<'_> {
             self.expand_by_width(number, estimate);
             return;
         }
-        let left = if self.strategy.counts_landmarks {
+        let left = if self.strategy.ranks_remaining() {
             self.nodes[number as usize].remaining
         } else {
             0
@@ -132,9 +133,28 @@ impl Search<'_> {
         self.novelty = Some(novelty);
     }
 
+    /// Returns the estimate of a state, or only its applicable steps; the number of its agenda, and
+    /// the number of remaining conjuncts or landmarks. Returns `None` for a dead end.
+    pub(super) fn estimate(
+        &mut self,
+        parent: u32,
+        state: &State,
+        left: u32,
+    ) -> Option<(Estimate, u32, u32)> {
+        if self.strategy.serializes_goals {
+            return self.estimate_subgoal(parent, state);
+        }
+        let estimate = if self.needs_estimate(parent, left) {
+            self.relaxed.evaluate(state)
+        } else {
+            self.relaxed.list(state)
+        };
+        Some((estimate?, NONE, left))
+    }
+
     /// Returns `true` if a state needs an estimate. Where the novelty of successors counts, only
     /// the first state and states with one more goal need one.
-    pub(super) fn needs_estimate(&self, parent: u32, left: u32) -> bool {
+    fn needs_estimate(&self, parent: u32, left: u32) -> bool {
         if self.strategy.novelty != Some(NoveltyOf::Successors) {
             return true;
         }
@@ -177,14 +197,10 @@ impl Search<'_> {
 
     /// Returns the rank of a state in the queue of its search; lower ranks come first.
     fn rank(&mut self, number: u32, estimate: u32) -> i64 {
-        if let Some(novelty) = &mut self.novelty {
-            let left = self.nodes[number as usize].remaining;
-            let state = self.states.get(number);
-            let (new, memory) = novelty.of(self.compiled, &state, (left, estimate));
-            self.memory += memory;
-            return new << 48 | i64::from(left) << 24 | i64::from(estimate.min(1 << 23));
+        if self.strategy.serializes_goals {
+            return self.rank_of_subgoal(number, estimate);
         }
-        if self.strategy.counts_landmarks {
+        if self.strategy.ranks_remaining() {
             let left = self.nodes[number as usize].remaining;
             let (overdrawn, estimate) = (estimate / OVERDRAWN, estimate % OVERDRAWN);
             return i64::from(overdrawn) << 48 | i64::from(left) << 24 | i64::from(estimate);
@@ -201,6 +217,23 @@ impl Search<'_> {
         step_costs.spent(self.compiled, &self.states.get(number)) + factor * estimate
     }
 
+    /// Returns the rank of a state in a search that serializes the goal: states with fewer remaining
+    /// conjuncts first, then novel ones. So the search leaves plateaus, and sequences of steps that
+    /// only change numbers.
+    fn rank_of_subgoal(&mut self, number: u32, estimate: u32) -> i64 {
+        let left = self.nodes[number as usize].remaining;
+        let (overdrawn, estimate) = (estimate / OVERDRAWN, estimate % OVERDRAWN);
+        let mut is_old = false;
+        if let Some(novelty) = &mut self.novelty {
+            let state = self.states.get(number);
+            let (new, memory) = novelty.of(self.compiled, &state, (0, estimate));
+            self.memory += memory;
+            is_old = new == 3;
+        }
+        let overdrawn = i64::from(overdrawn) << 56;
+        overdrawn | i64::from(left) << 32 | i64::from(is_old) << 31 | i64::from(estimate)
+    }
+
     /// Generates the successor. In a compressing search, the started action is also ended, if
     /// possible.
     pub(super) fn generate(&mut self, state: &State, step: Step) -> Option<(Step, State)> {
@@ -214,7 +247,7 @@ impl Search<'_> {
                     .count()
             };
             let may_run_twice = !(data.excludes_itself && self.strategy.is_complete());
-            if data.end != NONE && data.exclusion == NONE && may_run_twice {
+            if data.end != compile::NONE && data.exclusion == compile::NONE && may_run_twice {
                 let most = usize::from(self.strategy.is_complete());
                 if runs_already() > most {
                     self.is_lossy = true;
@@ -225,7 +258,7 @@ impl Search<'_> {
                 .strategy
                 .compresses
                 .is_some_and(|compresses| data.compressibility >= compresses);
-            if is_compressed && data.end != NONE {
+            if is_compressed && data.end != compile::NONE {
                 let whole = Step::Compressed(action);
                 if let Some(next) = self.stepper.apply(state, whole) {
                     self.is_lossy = true;

@@ -288,7 +288,7 @@ fn contents_that_share_an_envelope_are_found() {
     let problem = "(:objects f g - fuse) (:init (match)) (:goal (and (mended f) (mended g)))";
     let answer = tuned(domain, problem, Tuning::default(), 10_000);
     assert!(answer.found().is_some(), "{}", describe(&answer));
-    for member in [Member::Landmarks, Member::Width, Member::Novelty] {
+    for member in [Member::Landmarks, Member::Width, Member::Serializing] {
         let mut tuning = Tuning::default();
         tuning.only = Some(member);
         let answer = tuned(domain, problem, tuning, 10_000);

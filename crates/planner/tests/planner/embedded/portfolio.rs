@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use elbowroom_model::Situation;
-use elbowroom_planner::{Answer, Member, Settings, Technique, Tuning, plan};
+use elbowroom_planner::{Answer, FoundPlan, Member, Settings, Technique, Tuning, plan};
 
 use crate::embedded::world::{describe, task};
 
@@ -141,4 +141,87 @@ fn unachievable_goal_is_proved_unreachable() {
         describe(&answer),
         "no plan exists: `(before i j)` cannot become true"
     );
+}
+
+/// Returns a problem with robots that inspect places in any order and return to their dock. Each
+/// place is open for 5 at the beginning of each period of 20.
+fn inspection(robots: usize, places: usize) -> (String, String) {
+    let domain = "
+        (:requirements :typing :durative-actions :timed-initial-literals)
+        (:types robot place)
+        (:predicates (at ?r - robot ?p - place) (idle ?r - robot) (open) (seen ?p - place))
+        (:durative-action move :parameters (?r - robot ?p ?q - place) :duration (= ?duration 4)
+          :condition (and (at start (at ?r ?p)) (at start (idle ?r)))
+          :effect (and (at start (not (at ?r ?p))) (at end (at ?r ?q))))
+        (:durative-action look :parameters (?r - robot ?p - place) :duration (= ?duration 3)
+          :condition (and (over all (at ?r ?p)) (at start (idle ?r)) (over all (open)))
+          :effect (and (at start (not (idle ?r))) (at end (idle ?r)) (at end (seen ?p))))";
+    let robots: Vec<String> = (0..robots).map(|n| format!("r{n}")).collect();
+    let docks: Vec<String> = robots.iter().map(|robot| format!("d{robot}")).collect();
+    let places: Vec<String> = (0..places).map(|n| format!("p{n}")).collect();
+    let each = |names: &[String], text: &str| -> String {
+        names.iter().map(|name| text.replace('*', name)).collect()
+    };
+    let opening = |n: usize| {
+        format!(
+            "(at {} (open)) (at {} (not (open)))",
+            20 * n + 1,
+            20 * n + 6
+        )
+    };
+    let windows: String = (0..30).map(opening).collect();
+    let problem = format!(
+        "(:objects {} - robot {} {} - place)
+         (:init {windows} {})
+         (:goal (and {} {})) (:metric minimize (total-time))",
+        robots.join(" "),
+        docks.join(" "),
+        places.join(" "),
+        each(&robots, "(at * d*) (idle *) "),
+        each(&robots, "(at * d*) "),
+        each(&places, "(seen *) "),
+    );
+    (domain.to_owned(), problem)
+}
+
+/// Returns the first plan of that search.
+fn serialized(member: Member, domain: &str, problem: &str) -> Answer {
+    let mut tuning = Tuning::default();
+    tuning.only = Some(member);
+    tuning.without.push(Technique::Cleanup);
+    found(domain, problem, tuning, 1_000)
+}
+
+/// Returns the number of steps whose actions begin with that text.
+fn count(found: &FoundPlan, action: &str) -> usize {
+    let steps = found.plan.steps.iter();
+    steps
+        .filter(|step| step.action.name.starts_with(action))
+        .count()
+}
+
+/// A robot that returned to its dock after each place would need two moves for each of them.
+#[test]
+fn undone_goals_are_achieved_last() {
+    let (domain, problem) = inspection(1, 12);
+    for member in [Member::Serializing, Member::Spreading] {
+        let answer = serialized(member, &domain, &problem);
+        let found = answer
+            .found()
+            .unwrap_or_else(|| panic!("{}", describe(&answer)));
+        assert_eq!(count(found, "(move "), 13, "{}", describe(&answer));
+    }
+}
+
+#[test]
+fn spreading_search_uses_idle_robots() {
+    let (domain, problem) = inspection(4, 12);
+    let answer = serialized(Member::Spreading, &domain, &problem);
+    let found = answer
+        .found()
+        .unwrap_or_else(|| panic!("{}", describe(&answer)));
+    for robot in ["r0", "r1", "r2", "r3"] {
+        let looks = count(found, &format!("(look {robot} "));
+        assert!((2..=4).contains(&looks), "{looks} of {robot}");
+    }
 }

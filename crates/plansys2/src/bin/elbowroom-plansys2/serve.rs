@@ -133,8 +133,8 @@ impl Server {
         let mut leaves: Option<Duration> = None;
         let mut refusal = Ok(());
         loop {
-            // Until then, it gives way to an executor that it discovers.
-            if self.now() >= DISCOVERY_TIME {
+            // Until then, it gives way to an executor that it discovers, unless it executes a plan.
+            if self.execution.is_some() || self.now() >= DISCOVERY_TIME {
                 self.topics.hold_claim(self.now());
             }
             self.topics.publish_claim(self.now());

@@ -38,6 +38,7 @@ fn searched(task: &Task, most_memory: usize) -> (Option<Vec<Item>>, Tree) {
     let compresses = Some(Compressibility::HoldsResource);
     let mut relaxed = Relaxed::new(&compiled, compresses);
     relaxed.serves_repairs = true;
+    relaxed.lists_actions = true;
     let mut stepper = Stepper::new(&compiled);
     stepper.horizon = NEVER;
     let mut ticker = WorkMeter {

@@ -1,0 +1,5 @@
+(define (problem morning)
+  (:domain depot)
+  (:objects r1 r2 - robot  dock1 dock2 lab ward - place)
+  (:init (at r1 dock1) (at r2 dock2) (free lab) (free ward))
+  (:goal (and (at r1 dock1))))
