@@ -31,8 +31,10 @@ use elbowroom::report::trace::Line;
 use crate::background_planner::{BackgroundPlanner, BackgroundSettings};
 use crate::background_preparer::BackgroundPreparer;
 use crate::operator::{InteractiveWorld, OperatorInterface, TeeRecorder};
-use crate::run::EntryObserver;
 use crate::trace_buffer::TraceBuffer;
+
+/// Callback for entries of the record.
+pub type EntryObserver<'a> = Box<dyn FnMut(&Entry<'_>) + Send + 'a>;
 
 /// Wraps the ports of a run in the decorators that all runs have.
 #[derive(Clone, Copy)]
