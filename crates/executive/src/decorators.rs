@@ -31,18 +31,32 @@ use elbowroom::report::trace::Line;
 use crate::background_planner::{BackgroundPlanner, BackgroundSettings};
 use crate::background_preparer::BackgroundPreparer;
 use crate::operator::{InteractiveWorld, OperatorInterface, TeeRecorder};
-use crate::run::EntryObserver;
 use crate::trace_buffer::TraceBuffer;
+
+/// Callback for entries of the record.
+pub type EntryObserver<'a> = Box<dyn FnMut(&Entry<'_>) + Send + 'a>;
 
 /// Wraps the ports of a run in the decorators that all runs have.
 #[derive(Clone, Copy)]
 pub(crate) struct Decorators<'a> {
-    pub(crate) inputs: &'a RunInputs,
-    pub(crate) operator: &'a OperatorInterface,
-    pub(crate) background: &'a BackgroundSettings,
+    inputs: &'a RunInputs,
+    operator: &'a OperatorInterface,
+    background: &'a BackgroundSettings,
 }
 
 impl<'a> Decorators<'a> {
+    pub(crate) fn new(
+        inputs: &'a RunInputs,
+        operator: &'a OperatorInterface,
+        background: &'a BackgroundSettings,
+    ) -> Self {
+        Self {
+            inputs,
+            operator,
+            background,
+        }
+    }
+
     /// Returns the execution of the inputs with this planner, decorated by [`Self::planner`] or a decorator of that.
     pub(crate) fn execution<'e>(
         &self,

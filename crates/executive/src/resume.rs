@@ -231,11 +231,7 @@ impl InterruptedRun {
         let beliefs = BeliefUpdates::default();
         let replay = Arc::new(JournalReplay::new(&stored));
         let buffer = host.open_viewers(spec, task, &operator)?;
-        let decorators = Decorators {
-            inputs,
-            operator: &operator,
-            background: &background,
-        };
+        let decorators = Decorators::new(inputs, &operator, &background);
         let outcome = {
             let recorder = ReplayRecorder {
                 replay: Arc::clone(&replay),

@@ -8,7 +8,7 @@ use std::time::Duration;
 use elbowroom::answers::run::{RunOutcome, run as execute};
 use elbowroom::answers::{Event, Observer, StopRequest};
 use elbowroom::execute::{RunInputs, RunSpec, SpecError};
-use elbowroom::execution::{BeliefState, Entry, Planner, Recorder, World};
+use elbowroom::execution::{BeliefState, Planner, Recorder, World};
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 use elbowroom::report::trace::TraceWriter;
@@ -18,6 +18,7 @@ use crate::background_planner::BackgroundSettings;
 use crate::belief_updates::BeliefUpdates;
 use crate::clock::Clock;
 use crate::decorators::Decorators;
+pub use crate::decorators::EntryObserver;
 use crate::embedded_world::EmbeddedWorld;
 use crate::error::{Error, WarningSink};
 use crate::journal::{JournalFile, Segments};
@@ -113,9 +114,6 @@ pub struct JournaledOutcome {
     /// Reason why the journal is incomplete, or `None` if all records are written.
     pub journal_failure: Option<String>,
 }
-
-/// Callback for entries of the record.
-pub type EntryObserver<'a> = Box<dyn FnMut(&Entry<'_>) + Send + 'a>;
 
 /// A run with its surroundings.
 pub struct RunAssembly<'a> {
@@ -233,11 +231,7 @@ impl<'a> RunAssembly<'a> {
     where
         'a: 'd,
     {
-        Decorators {
-            inputs: self.inputs,
-            operator: self.operator,
-            background,
-        }
+        Decorators::new(self.inputs, self.operator, background)
     }
 
     /// Returns the arguments for the connection to the world.
