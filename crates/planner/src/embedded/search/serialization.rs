@@ -119,7 +119,10 @@ impl Search<'_> {
         let empty = || vec![0; words].into_boxed_slice();
         let (mut kept, mut postponed) = known.unwrap_or_else(|| (empty(), empty()));
         for (number, is_undone) in (0..).zip(undone_literals(self.compiled, &whole.actions)) {
-            let is_last = is_undone || is_set(&postponed, number);
+            // A tractor that unhitches early returns its plough to others, so the other search may
+            // achieve a conjunct that is undone later.
+            let stays = !self.strategy.spreads_work && is_set(&postponed, number);
+            let is_last = is_undone || stays;
             set(&mut postponed, number, is_last);
         }
         let holds: Vec<bool> = conjuncts(self.compiled, state).collect();
