@@ -23,6 +23,9 @@ pub(super) struct Agenda {
     kept: Box<[u64]>,
     /// The conjuncts of which one is to be achieved, as a bit set.
     candidates: Box<[u64]>,
+    /// The conjuncts that a relaxed plan made false on the path so far, as a bit set. They come
+    /// last.
+    postponed: Box<[u64]>,
     subgoal: Subgoal,
     /// `true` if the relaxed plan for the whole goal overdraws a consumable at the beginning of
     /// this part.
@@ -44,7 +47,7 @@ impl Agenda {
 
     /// Returns an estimate of the memory, in bytes.
     fn size(&self) -> usize {
-        let words = self.kept.len() + self.candidates.len();
+        let words = 3 * self.kept.len();
         let Subgoal {
             kept,
             candidates,
@@ -75,8 +78,9 @@ impl Search<'_> {
             }
             _ => {
                 let whole = self.relaxed.evaluate(state)?;
-                let kept = before.map(|(agenda, _)| agenda.kept.clone());
-                let agenda = self.next_agenda(state, kept.as_deref(), &whole);
+                let known =
+                    before.map(|(agenda, _)| (agenda.kept.clone(), agenda.postponed.clone()));
+                let agenda = self.next_agenda(state, known, &whole);
                 let left = self.relaxed.graph().goal.len() - agenda.subgoal.kept.len();
                 if agenda.subgoal.candidates.is_empty() {
                     return Some((whole, node::NONE, 0));
@@ -101,28 +105,41 @@ impl Search<'_> {
         Some((estimate, number, left))
     }
 
-    /// Returns the agenda after a state with a relaxed plan for the whole goal. `kept` are the
-    /// conjuncts kept so far.
-    fn next_agenda(&mut self, state: &State, kept: Option<&[u64]>, whole: &Estimate) -> Agenda {
+    /// Returns the agenda after a state with a relaxed plan for the whole goal. `known` are the
+    /// conjuncts kept and postponed so far.
+    fn next_agenda(
+        &mut self,
+        state: &State,
+        known: Option<(Box<[u64]>, Box<[u64]>)>,
+        whole: &Estimate,
+    ) -> Agenda {
         let (late_operators, costs) = self.relaxed.lateness(state, self.strategy.spreads_work);
         let goals = &self.relaxed.graph().goal;
         let words = goals.len().div_ceil(64);
-        let is_undone = undone_literals(self.compiled, &whole.actions);
-        let is_undone = |number: u32| is_undone.get(number as usize).is_some_and(|&undone| undone);
-        let mut kept = kept.map_or_else(|| vec![0; words], <[u64]>::to_vec);
-        let mut open = vec![0; words];
-        let mut candidates = vec![0; words];
-        for (number, holds) in (0..).zip(conjuncts(self.compiled, state)) {
+        let empty = || vec![0; words].into_boxed_slice();
+        let (mut kept, mut postponed) = known.unwrap_or_else(|| (empty(), empty()));
+        for (number, is_undone) in (0..).zip(undone_literals(self.compiled, &whole.actions)) {
+            // A tractor that unhitches early returns its plough to others, so the other search may
+            // achieve a conjunct that is undone later.
+            let stays = !self.strategy.spreads_work && is_set(&postponed, number);
+            let is_last = is_undone || stays;
+            set(&mut postponed, number, is_last);
+        }
+        let holds: Vec<bool> = conjuncts(self.compiled, state).collect();
+        let mut open = (0..).zip(&holds).filter(|(_, holds)| !**holds);
+        if open.all(|(number, _)| is_set(&postponed, number)) {
+            // All others hold.
+            postponed.fill(0);
+        }
+        let mut candidates = empty();
+        for (number, holds) in (0..).zip(holds) {
+            let is_last = is_set(&postponed, number);
             if holds {
-                let is_kept = is_set(&kept, number) || !is_undone(number);
+                let is_kept = is_set(&kept, number) || !is_last;
                 set(&mut kept, number, is_kept);
             } else {
-                set(&mut open, number, true);
-                set(&mut candidates, number, !is_undone(number));
+                set(&mut candidates, number, !is_last);
             }
-        }
-        if candidates.iter().all(|&word| word == 0) {
-            candidates = open;
         }
         let propositions = |set: &[u64]| {
             let members = (0..).zip(goals).filter(|(number, _)| is_set(set, *number));
@@ -135,8 +152,9 @@ impl Search<'_> {
                 late_operators,
                 costs,
             },
-            kept: kept.into(),
-            candidates: candidates.into(),
+            kept,
+            postponed,
+            candidates,
             is_overdrawn: whole.steps >= OVERDRAWN,
         }
     }

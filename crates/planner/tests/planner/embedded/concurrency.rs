@@ -206,6 +206,7 @@ fn progressing_search_keeps_its_turn() {
     let (domain, problem) = pottery(40);
     let evaluated = |patience: u64| {
         let mut tuning = Tuning::default();
+        tuning.without.push(Technique::Serialization);
         tuning.first_round_with_concurrency = 65;
         tuning.patience = patience;
         counts(&tuned(&domain, &problem, tuning, 50_000)).evaluated
