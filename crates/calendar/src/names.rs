@@ -46,8 +46,8 @@ pub(crate) fn ground(text: &str, kind: Kind, problem: &Problem) -> Result<Vec<St
     let mut all: Vec<Vec<ObjectId>> = vec![Vec::new()];
     for (argument, parameter) in arguments.iter().zip(parameters) {
         let objects = objects(argument, parameter, problem)?;
-        if all.len().saturating_mul(objects.len()) > MOST_NAMES {
-            let message = format!("`{text}` matches more than {MOST_NAMES} {}s", kind.word());
+        if all.len().saturating_mul(objects.len()) > MAX_NAMES {
+            let message = format!("`{text}` matches more than {MAX_NAMES} {}s", kind.word());
             return Err((message, "name some of the objects".to_owned()));
         }
         all = all
@@ -70,7 +70,7 @@ pub(crate) fn ground(text: &str, kind: Kind, problem: &Problem) -> Result<Vec<St
 }
 
 /// Maximum number of names that a pattern may match.
-const MOST_NAMES: usize = 10_000;
+const MAX_NAMES: usize = 10_000;
 
 impl Kind {
     fn word(self) -> &'static str {

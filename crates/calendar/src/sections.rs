@@ -18,10 +18,10 @@ use crate::rule::Rule;
 use crate::{CalendarFact, CalendarFluent};
 
 /// Maximum number of days of a rule: a hundred years.
-const MOST_DAYS: i64 = 36_600;
+const MAX_DAYS: i64 = 36_600;
 
 /// Maximum number of windows of all facts, and of those of all values. Planners cannot handle more.
-const MOST_WINDOWS: usize = 200_000;
+const MAX_WINDOWS: usize = 200_000;
 
 /// Returns the facts of the `[[window]]` sections with their windows, in the order of the file.
 pub(crate) fn facts(
@@ -163,15 +163,15 @@ fn values(layers: &[(Rational, Ranges)], begin: i64) -> Vec<(i64, Rational)> {
 }
 
 /// Returns `true`, and adds an error to the report, if there are more windows than
-/// [`MOST_WINDOWS`].
+/// [`MAX_WINDOWS`].
 fn too_many(count: usize, section: &Spanned<Section>, report: &mut Report) -> bool {
-    if count > MOST_WINDOWS {
+    if count > MAX_WINDOWS {
         let message =
-            format!("the calendar has more than {MOST_WINDOWS} windows (counted up to here)");
+            format!("the calendar has more than {MAX_WINDOWS} windows (counted up to here)");
         let error = report.error(section.span(), message);
         error.advise("choose a nearer `horizon`, or name fewer objects");
     }
-    count > MOST_WINDOWS
+    count > MAX_WINDOWS
 }
 
 /// Reports keys without a meaning in a section.
@@ -304,7 +304,7 @@ fn rule(section: &Spanned<Section>, frame: &Frame, report: &mut Report) -> Optio
         error.advise("add `horizon = \"7 days\"` to the head of the file, or `to` here");
         return None;
     }
-    if rule.day_count(&frame.within) > MOST_DAYS {
+    if rule.day_count(&frame.within) > MAX_DAYS {
         let error = report.error(
             section.span(),
             "the window recurs for more than a hundred years",

@@ -16,7 +16,7 @@ pub use elbowroom_selection::{
     planning_work, read_goal, rewrite,
 };
 pub use spec::{
-    AdversaryError, AdversarySettings, EMBEDDED, FirstPlanError, MOST_STATES, NO_PLANNER,
-    NamedText, RunInputs, RunSpec, SpecError, WorldNames,
+    AdversaryError, AdversarySettings, EMBEDDED, FirstPlanError, MAX_STATES, NO_PLANNER, NamedText,
+    RunInputs, RunSpec, SpecError, WorldNames,
 };
 pub(crate) use spec::{as_text, listed};

@@ -35,7 +35,7 @@ pub use elbowroom_network::*;
 pub use simulate::{Durations, Simulation, SimulationError};
 
 /// Default limit on branches in the check of weak controllability.
-pub const MOST_BRANCHES: usize = 1 << 12;
+pub const MAX_BRANCHES: usize = 1 << 12;
 
 /// A request for an analysis of a temporal network.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -49,7 +49,7 @@ pub struct Request {
 impl Default for Request {
     fn default() -> Self {
         Self {
-            most_branches: MOST_BRANCHES,
+            most_branches: MAX_BRANCHES,
             simulation: None,
         }
     }

@@ -204,7 +204,7 @@ pub fn limits(
     envelope: &DecoupledEnvelope,
     (ends, steps): (&[BoxEnd], &[Rational]),
     flow: &mut dyn FnMut() -> ControlFlow<()>,
-    tell: &mut dyn FnMut(BoxEnd, &Limit),
+    on_limit: &mut dyn FnMut(BoxEnd, &Limit),
 ) {
     let plan = Arc::clone(oracle.plan());
     oracle.accept_if_inside(envelope);
@@ -214,7 +214,7 @@ pub fn limits(
         }
         let (own, step) = (plan.parameter(end.parameter), &steps[end.parameter.index()]);
         if let Some(limit) = limit(oracle, envelope, own, end, step) {
-            tell(end, &limit);
+            on_limit(end, &limit);
         }
     }
 }

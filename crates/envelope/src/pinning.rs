@@ -35,7 +35,7 @@ pub fn pin_deordered(task: &Task, plan: ParametrizedPlan, nominal: &Schedule) ->
 /// box check reports the problem later.
 pub fn pin(task: &Task, plan: &ParametrizedPlan, nominal: &Schedule) -> ParametrizedPlan {
     // Too many open sides would lead to too many cases.
-    let is_manageable = most_sides(&plan.plan) <= MOST_SIDES;
+    let is_manageable = most_sides(&plan.plan) <= MAX_SIDES;
     if is_manageable && let Some(found) = pinned(task, plan, nominal) {
         return found;
     }
@@ -102,7 +102,7 @@ pub fn pin_in_order(
 }
 
 /// Maximum number of open sides of one time point.
-const MOST_SIDES: usize = 12;
+const MAX_SIDES: usize = 12;
 
 /// Returns the greatest number of sides of one time point.
 fn most_sides(plan: &StnPlan) -> usize {
@@ -256,7 +256,7 @@ fn loosened(
 }
 
 /// Maximum number of box checks; after that, bounds keep their values.
-const MOST_CHECKS: usize = 2_000;
+const MAX_CHECKS: usize = 2_000;
 
 /// A box that is widened as long as every schedule works.
 ///
@@ -280,7 +280,7 @@ impl Growth<'_> {
             let mut open = ends.clone();
             // Four steps of one size exceed the next larger one, which was rejected unless the end
             // is unlimited.
-            for _ in 0..MOST_STEPS {
+            for _ in 0..MAX_STEPS {
                 open.retain(|&end| self.try_move(end, &step));
             }
         }
@@ -317,7 +317,7 @@ impl Growth<'_> {
 
     fn accepts(&mut self, end: BoxEnd, reach: Option<Rational>) -> bool {
         self.checks += 1;
-        self.checks <= MOST_CHECKS && self.sound.try_reach(end, reach).unwrap_or(false)
+        self.checks <= MAX_CHECKS && self.sound.try_reach(end, reach).unwrap_or(false)
     }
 
     /// Removes the ends of a pin without a limit.
@@ -333,7 +333,7 @@ impl Growth<'_> {
 }
 
 /// Maximum number of steps of one size for an end.
-const MOST_STEPS: usize = 4;
+const MAX_STEPS: usize = 4;
 
 /// Returns 5, 2 and 1 times each power of ten times `least`, from the first value up to `largest`
 /// down to `least`.

@@ -8,10 +8,10 @@ use elbowroom_pddl::{PrintedPlan, Source, read_printed_plan, write_plan, write_r
 use crate::rounding::RoundingRule;
 
 /// A plan whose numbers have no more digits after the point than this is written exactly.
-const MOST_EXACT_DIGITS: u32 = 9;
+const MAX_EXACT_DIGITS: u32 = 9;
 /// Limits on the number of digits after the point of other plans.
 const FEWEST_DIGITS: u32 = 3;
-const MOST_DIGITS: u32 = 18;
+const MAX_DIGITS: u32 = 18;
 
 /// Returns the plan as text for other tools: all numbers are decimals.
 ///
@@ -23,7 +23,7 @@ const MOST_DIGITS: u32 = 18;
 /// decimal.
 pub fn plan_text(task: &Task, plan: &TimeTriggeredPlan) -> String {
     let has_decimal = |value: &Rational| {
-        let decimal: Result<Rational, _> = value.to_decimal(MOST_EXACT_DIGITS).parse();
+        let decimal: Result<Rational, _> = value.to_decimal(MAX_EXACT_DIGITS).parse();
         decimal.is_ok_and(|decimal| decimal == *value)
     };
     let mut numbers = plan
@@ -35,7 +35,7 @@ pub fn plan_text(task: &Task, plan: &TimeTriggeredPlan) -> String {
     }
     let like_val = Settings::like_val(Rational::new(1, 1000));
     let mut first = None;
-    for digits in FEWEST_DIGITS..=MOST_DIGITS {
+    for digits in FEWEST_DIGITS..=MAX_DIGITS {
         let text = write_rounded_plan(task, plan, digits);
         let Some(printed) = reparse(task, &text) else {
             break;

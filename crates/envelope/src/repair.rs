@@ -142,7 +142,7 @@ struct OpenCase {
 ///
 /// `order`, if present, gives each node a time, and interfering actions keep that order. Without it
 /// they keep the order that the plan's bounds imply, and all orders that are left open are
-/// searched. Parameters that are not in `changeable` keep their nominal values. `judge` returns
+/// searched. Parameters that are not in `changeable` keep their nominal values. `accepts` returns
 /// `true` if the plan with these values and times is valid. `flow` is polled between linear
 /// programs, and can end the search.
 ///
@@ -154,12 +154,12 @@ pub fn repair(
     order: Option<&Schedule>,
     changeable: &[Changeable],
     limits: &RepairLimits,
-    judge: &mut dyn FnMut(&Valuation, &Schedule) -> bool,
+    accepts: &mut dyn FnMut(&Valuation, &Schedule) -> bool,
     flow: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Result<RepairRun, Refusal> {
     let orders = Orders::new(task, plan, order);
     if let Some((values, schedule)) = unchanged(plan, changeable, task, &orders)
-        && judge(&values, &schedule)
+        && accepts(&values, &schedule)
     {
         let repair = Repair {
             values,
@@ -208,7 +208,7 @@ pub fn repair(
             schedule,
             because,
         } = &case.solved;
-        if judge(values, schedule) {
+        if accepts(values, schedule) {
             let repair = Repair {
                 cost: program.cost_of(values),
                 values: values.clone(),

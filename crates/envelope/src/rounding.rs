@@ -31,9 +31,9 @@ use crate::{RepairLimits, RepairRun, repair};
 /// The largest difference that counts as rounding if the user gives no tolerance.
 const LARGEST_UNIT: (i64, i64) = (1, 1000);
 /// Limit on the steps of plans whose numeric conditions are met by linear programs.
-const MOST_STEPS: usize = 200;
+const MAX_STEPS: usize = 200;
 /// Limit on the linear programs solved for one plan.
-const MOST_PROGRAMS: usize = 60;
+const MAX_PROGRAMS: usize = 60;
 
 /// The rule about rounded plans, with its settings.
 #[derive(Clone, Debug, Default)]
@@ -224,7 +224,7 @@ impl RoundingRule {
         plan: &TimeTriggeredPlan,
         windows: &[StepWindow],
     ) -> Option<TimeTriggeredPlan> {
-        if task.unsupported_by_analysis().is_some() || plan.steps.len() > MOST_STEPS {
+        if task.unsupported_by_analysis().is_some() || plan.steps.len() > MAX_STEPS {
             return None;
         }
         let mut free = unordered(task, plan);
@@ -232,7 +232,7 @@ impl RoundingRule {
         let closed = ParametrizedPlan::closed(task, free.plan);
         let at = |schedule: &Schedule| with_times(plan, &closed.plan, &free.instances, schedule);
         let limits = RepairLimits {
-            cases: MOST_PROGRAMS,
+            cases: MAX_PROGRAMS,
             ..RepairLimits::default()
         };
         let run = repair(

@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 
 use robots::{Events, mission, ready};
 
-const MOST_EVENTS: usize = 20_000;
+const MAX_EVENTS: usize = 20_000;
 
 fn main() {
     // As in the test harness, words are filters on the names.
@@ -41,9 +41,9 @@ fn row(executor: &str, nodes: usize) {
     let mut times = Vec::new();
     loop {
         let begin = Instant::now();
-        let goes_on = events.next(decider.as_mut());
+        let may_continue = events.next(decider.as_mut());
         times.push(begin.elapsed());
-        if !goes_on || times.len() == MOST_EVENTS {
+        if !may_continue || times.len() == MAX_EVENTS {
             break;
         }
     }

@@ -90,7 +90,7 @@ pub enum Event {
         value: Rational,
     },
     /// A request to the run from people or other programs ([`Request`]).
-    Asked(Request),
+    Requested(Request),
     /// The plan that is made in the background is finished, or certain to fail.
     PlanMade,
     /// The plan that is prepared in the background is ready, or certain to fail.
@@ -104,7 +104,7 @@ pub enum Event {
     },
 }
 
-/// Request from an operator to an executive ([`Run::lasting`](crate::run::Run::lasting)).
+/// Request from an operator to an executive ([`Run::persistent`](crate::run::Run::persistent)).
 /// [Attended](crate::run::Run::interactive) runs do not accept goals; other runs ignore all requests.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Request {

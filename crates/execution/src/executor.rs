@@ -99,7 +99,7 @@ pub trait Executor: Send {
     /// Returns the latest end of a running step with which no new plan is needed if nothing else
     /// deviates, on the world's clock, as far as it can be computed. `None` if only the step's
     /// window is known.
-    fn bears_until(&self, _step: StepId, _now: &Rational) -> Option<Rational> {
+    fn latest_tolerated_end(&self, _step: StepId, _now: &Rational) -> Option<Rational> {
         None
     }
 

@@ -26,10 +26,10 @@
 //! | no report at all | a warning ([`Entry::Warning`]), and at its time-out ([`TimeoutRule`]) the action is cancelled and counts as failed. If the slack of running actions is monitored ([`RunSettings::monitors_slack`]), the same applies to an action whose delay no plan tolerates any more |
 //! | a fact or value other than believed | believed; the executor is notified, and simulates the remaining plan |
 //!
-//! A run can also continue after its goal is reached ([`Run::lasting`]): goals are added and
+//! A run can also continue after its goal is reached ([`Run::persistent`]): goals are added and
 //! abandoned while it runs, and it can be paused.
 //!
-//! With background planning ([`RunSettings::plans_aside`]), execution continues during a search:
+//! With background planning ([`RunSettings::plans_in_background`]), execution continues during a search:
 //!
 //! | a plan is needed because | until the plan exists |
 //! | --- | --- |
@@ -55,7 +55,7 @@
 //! in which everything else has started and ended as planned. It is notified again when events
 //! deviate from that.
 //!
-//! Plans can also be prepared in the background ([`RunSettings::readies_aside`]). Then a new plan
+//! Plans can also be prepared in the background ([`RunSettings::prepares_in_background`]). Then a new plan
 //! is fitted to the present situation as soon as it exists, including committed actions that have
 //! not begun, and is prepared for that situation. It takes over as soon as it is prepared, and its
 //! executor is notified of the starts and ends since then:
@@ -238,12 +238,12 @@ impl<'a> Run<'a> {
         run
     }
 
-    /// Makes the run end as soon as `is_to_end` returns `true`: running actions are cancelled, and
+    /// Makes the run end as soon as `must_end` returns `true`: running actions are cancelled, and
     /// the report is complete. It is called before each decision, and after each answer of the
     /// world and of the planner.
     #[must_use]
-    pub fn with_stop_check(mut self, is_to_end: impl Fn() -> bool + Send + 'a) -> Self {
-        self.closing.set_stop_check(is_to_end);
+    pub fn with_stop_check(mut self, must_end: impl Fn() -> bool + Send + 'a) -> Self {
+        self.closing.set_stop_check(must_end);
         self
     }
 
@@ -275,10 +275,10 @@ impl<'a> Run<'a> {
     }
 
     /// Turns the run into an executive, which does not end when its goal is reached or unreachable.
-    /// It waits for other goals ([`Event::Asked`](crate::Event::Asked)), which `reader` reads. It
+    /// It waits for other goals ([`Event::Requested`](crate::Event::Requested)), which `reader` reads. It
     /// ends at the time limit, when the world fails, or when its end is requested.
     #[must_use]
-    pub fn lasting(mut self, reader: impl GoalReader + 'a) -> Self {
+    pub fn persistent(mut self, reader: impl GoalReader + 'a) -> Self {
         self.goals = GoalManager::executive(&self.task, reader);
         self
     }

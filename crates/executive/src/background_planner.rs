@@ -100,8 +100,10 @@ impl<'a> BackgroundPlanner<'a> {
                 })
             };
             let is_needed = || !cancel.is_requested() && !run_stop.is_requested();
-            let goes_on = || is_needed() && !is_too_much();
-            let mut planner = spec.planner_of_new_plans(None, &clock, &goes_on).ok()?;
+            let may_continue = || is_needed() && !is_too_much();
+            let mut planner = spec
+                .planner_of_new_plans(None, &clock, &may_continue)
+                .ok()?;
             let mut made = planner.plan(&own, &from);
             if is_too_much() && !matches!(made.answer, PlanAnswer::Plan(_)) {
                 let most = most_memory.unwrap_or_default() >> 20;

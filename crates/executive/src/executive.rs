@@ -395,8 +395,8 @@ impl RunHost for Executive {
 /// Makes the run of a specification persistent: it waits for further goals, and plans in the background.
 pub fn make_persistent(spec: &mut RunSpec) {
     spec.is_persistent = true;
-    spec.plans_aside = spec.can_plan_in_background();
-    spec.readies_aside = spec.plans_aside;
+    spec.plans_in_background = spec.can_plan_in_background();
+    spec.prepares_in_background = spec.plans_in_background;
 }
 
 /// Returns the world with a shorter lifetime.

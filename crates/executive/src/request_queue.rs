@@ -171,14 +171,14 @@ impl RequestQueue {
             std::mem::take(&mut state.waiting)
         };
         let events = requests.into_iter().filter_map(|request| match request {
-            ExternalRequest::Request(request) => Some(Event::Asked(request)),
+            ExternalRequest::Request(request) => Some(Event::Requested(request)),
             ExternalRequest::TimedGoal {
                 name,
                 goal,
                 terms,
                 within,
                 after,
-            } => Some(Event::Asked(Request::Pursue {
+            } => Some(Event::Requested(Request::Pursue {
                 name,
                 goal,
                 terms: GoalTerms {

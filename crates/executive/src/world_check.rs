@@ -239,9 +239,9 @@ fn advance_until(
         let until = (&before + step).min(last.clone());
         player.wait(&until)?;
         idle = if player.now > before { 0 } else { idle + 1 };
-        if idle > MOST_IDLE {
+        if idle > MAX_IDLE {
             let why = format!(
-                "its clock does not advance beyond {}: {MOST_IDLE} answers brought no progress",
+                "its clock does not advance beyond {}: {MAX_IDLE} answers brought no progress",
                 before.to_f64()
             );
             player.findings.record_violation(Check::KeepsTime, why);
@@ -252,4 +252,4 @@ fn advance_until(
 }
 
 /// Maximum number of consecutive answers that leave the time unchanged.
-const MOST_IDLE: usize = 100;
+const MAX_IDLE: usize = 100;

@@ -61,7 +61,7 @@ use elbowroom_plan::{
 };
 
 /// Largest number of positions that are distinguished for a moment inside an action.
-const MOST_POSITIONS: usize = 4_096;
+const MAX_POSITIONS: usize = 4_096;
 
 /// Reasons why a document cannot be exported.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -189,7 +189,7 @@ pub fn box_check(
     guarantee: Guarantee,
 ) -> Result<String, ExportError> {
     let around = envelope.nearest(&plan.nominal());
-    let form = LinearForm::new(task, plan, envelope, &around, MOST_POSITIONS).map_err(refused)?;
+    let form = LinearForm::new(task, plan, envelope, &around, MAX_POSITIONS).map_err(refused)?;
     let text = smt::Text::new(task, plan, &form);
     let mut written = text.box_heading(envelope, guarantee);
     text.conditions(envelope, &mut written);
@@ -213,7 +213,7 @@ pub fn box_check(
 /// When the plan has no schedule at its nominal values, or is beyond exact analysis.
 pub fn region(task: &Task, plan: &ParametrizedPlan) -> Result<String, ExportError> {
     let ranges = DecoupledEnvelope::ranges(plan);
-    let form = LinearForm::new(task, plan, &ranges, &plan.nominal(), MOST_POSITIONS);
+    let form = LinearForm::new(task, plan, &ranges, &plan.nominal(), MAX_POSITIONS);
     let form = form.map_err(refused)?;
     Ok(smt::Text::new(task, plan, &form).region(&ranges))
 }

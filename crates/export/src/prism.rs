@@ -23,7 +23,7 @@ pub use timed::{Bound, timed};
 pub use untimed::untimed;
 
 /// Maximum number of commands: model checkers evaluate each of them in each state.
-pub const MOST_COMMANDS: usize = 20_000;
+pub const MAX_COMMANDS: usize = 20_000;
 
 /// Reasons why no process is written.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -71,7 +71,7 @@ pub enum PrismError {
     #[error(
         "the process has {commands} commands, more than the limit of {most}: give fewer --cells, \
          or a problem with fewer actions",
-        most = MOST_COMMANDS
+        most = MAX_COMMANDS
     )]
     TooLarge {
         /// Number of commands.
@@ -91,7 +91,7 @@ pub enum PrismError {
 /// Returns the text, unless it has too many commands.
 fn checked(text: String) -> Result<String, PrismError> {
     let commands = text.lines().filter(|line| line.contains(" -> ")).count();
-    if commands > MOST_COMMANDS {
+    if commands > MAX_COMMANDS {
         return Err(PrismError::TooLarge { commands });
     }
     Ok(text)

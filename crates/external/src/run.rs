@@ -50,12 +50,12 @@ pub fn plan(
     };
     match prepared {
         Ok((question, workspace, command)) => {
-            let judge = PlanValidator {
+            let validator = PlanValidator {
                 request,
                 question,
                 repair,
             };
-            let run = Run::new(judge, settings, observe);
+            let run = Run::new(validator, settings, observe);
             run.run(planner, workspace, command)
         }
         Err(outcome) => Report {
@@ -91,12 +91,12 @@ impl Drop for StopAtEnd<'_> {
 
 impl<'a, 'r> Run<'a, 'r> {
     fn new(
-        judge: PlanValidator<'a, 'r>,
+        validator: PlanValidator<'a, 'r>,
         settings: &'a Settings,
         observe: &'a mut dyn FnMut(&Event<'_>) -> ControlFlow<()>,
     ) -> Self {
         Self {
-            validator: judge,
+            validator,
             settings,
             observe,
             clock: Clock::start(),

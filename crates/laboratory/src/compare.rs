@@ -150,16 +150,16 @@ pub fn run_recorded(
         .collect();
     let done = AtomicU64::new(0);
     let told = || observe(done.fetch_add(1, Ordering::Relaxed) + 1);
-    let goes_on = || observe(done.load(Ordering::Relaxed));
+    let may_continue = || observe(done.load(Ordering::Relaxed));
     let parts: Vec<Result<Results, ExperimentError>> = pool.install(|| {
         settings
             .par_iter()
-            .map(|setting| setting.run(part, records, &told, &goes_on))
+            .map(|setting| setting.run(part, records, &told, &may_continue))
             .collect()
     });
     // Added in the order of the settings, for reproducible results.
     let mut whole = Results::empty(experiment, part);
-    whole.is_interrupted = done.load(Ordering::Relaxed) < part.count(experiment) && !goes_on();
+    whole.is_interrupted = done.load(Ordering::Relaxed) < part.count(experiment) && !may_continue();
     for part in parts {
         match part {
             Ok(part) => whole.add(&part),
@@ -169,8 +169,8 @@ pub fn run_recorded(
         }
     }
     if experiment.optimum && !whole.is_interrupted {
-        whole.optimum = pool.install(|| optimum::of(experiment, &fillings, part, &goes_on))?;
-        whole.is_interrupted = !goes_on();
+        whole.optimum = pool.install(|| optimum::of(experiment, &fillings, part, &may_continue))?;
+        whole.is_interrupted = !may_continue();
     }
     Ok(whole)
 }

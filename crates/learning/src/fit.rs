@@ -232,7 +232,7 @@ fn uniform(samples: &[Sample], resolution: f64) -> Option<Fit> {
 /// value.
 fn empirical(samples: &[Sample]) -> Option<Fit> {
     /// Maximum number of copies of a value, as a multiple of the number of samples.
-    const MOST_COPIES: f64 = 8.0;
+    const MAX_COPIES: f64 = 8.0;
     let survival = SurvivalFunction::of(samples);
     let last = survival.steps().last()?;
     if last.1 > 1e-9 {
@@ -249,7 +249,7 @@ fn empirical(samples: &[Sample]) -> Option<Fit> {
     let mut likelihood = 0.0;
     let mut sum = 0.0;
     for (value, mass) in &masses {
-        let copies = (mass * count).round().clamp(1.0, MOST_COPIES * count);
+        let copies = (mass * count).round().clamp(1.0, MAX_COPIES * count);
         #[allow(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,

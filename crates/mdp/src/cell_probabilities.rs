@@ -66,7 +66,7 @@ impl EndProbabilities {
 }
 
 /// Maximum number of parts of a duration that are distinguished for the time of a failure.
-const MOST_SHARES: f64 = 10_000.0;
+const MAX_SHARES: f64 = 10_000.0;
 
 /// Returns the length of a cell, in seconds.
 pub(crate) fn step(world: &TimedWorld, cells: usize) -> f64 {
@@ -232,7 +232,7 @@ fn shares(resolution: f64, midway: f64) -> Vec<(f64, f64)> {
     if midway <= 0.0 {
         return Vec::new();
     }
-    let fineness = resolution.max(1.0 / MOST_SHARES);
+    let fineness = resolution.max(1.0 / MAX_SHARES);
     let below = |value: f64| value.clamp(0.0, 1.0);
     let mut shares = Vec::new();
     let mut at = 0.0;

@@ -67,7 +67,7 @@ pub(super) trait Expansion {
         cell: usize,
         states: &IndexSet<State>,
         later: &mut Layers,
-        hopes: &mut ReachabilityCache,
+        reachability: &mut ReachabilityCache,
         limits: &Limits<'_>,
     ) -> Result<Nodes, Stop>;
 
@@ -114,7 +114,7 @@ const WAYS: usize = 16;
 
 /// Limit on the combinations of events of one state in a cell. It is needed because each running action
 /// may end or not, so their number grows exponentially.
-pub(super) const MOST_WAYS: usize = 1 << 16;
+pub(super) const MAX_WAYS: usize = 1 << 16;
 
 /// Work for each node and each result of its choices, in units of [`elbowroom_num::work`].
 const NODE_WORK: u64 = 500;
@@ -220,9 +220,9 @@ pub(super) struct Values(pub(super) BTreeMap<u32, Vec<f64>>);
 pub(super) fn value(
     bound: &impl Expansion,
     left: &mut usize,
-    goes_on: &dyn Fn() -> bool,
+    may_continue: &dyn Fn() -> bool,
 ) -> Result<f64, Stop> {
-    let (layers, values) = backward_induction(bound, left, Discounts::NONE, goes_on)?;
+    let (layers, values) = backward_induction(bound, left, Discounts::NONE, may_continue)?;
     let of = |state: &State| {
         let place = layers.get(&0)?.get_index_of(state)?;
         Some(values.0.get(&0)?[place])
@@ -239,14 +239,14 @@ pub(super) fn backward_induction(
     bound: &impl Expansion,
     left: &mut usize,
     tolls: Discounts,
-    goes_on: &dyn Fn() -> bool,
+    may_continue: &dyn Fn() -> bool,
 ) -> Result<(Layers, Values), Stop> {
-    let mut hopes = ReachabilityCache::new();
-    let mut layers = explore_forward(bound, &mut hopes, left, goes_on)?;
+    let mut reachability = ReachabilityCache::new();
+    let mut layers = explore_forward(bound, &mut reachability, left, may_continue)?;
     let mut found = Values::default();
     let cells: Vec<u32> = layers.keys().copied().collect();
     for cell in cells.into_iter().rev() {
-        if !goes_on() {
+        if !may_continue() {
             return Err(Stop::Interrupted);
         }
         let states = layers.remove(&cell).unwrap_or_default();
@@ -254,10 +254,16 @@ pub(super) fn backward_induction(
             states.iter().map(|state| bound.last(state)).collect()
         } else {
             let limits = Limits {
-                may_continue: goes_on,
+                may_continue,
                 ..Limits::NONE
             };
-            let nodes = bound.expand(cell as usize, &states, &mut layers, &mut hopes, &limits)?;
+            let nodes = bound.expand(
+                cell as usize,
+                &states,
+                &mut layers,
+                &mut reachability,
+                &limits,
+            )?;
             let mut values = solve_cell(&nodes, &found, tolls);
             values.truncate(states.len());
             values
@@ -275,23 +281,23 @@ const NODES: usize = 4;
 /// Returns the states at the beginning of each cell, and at the end of the last.
 fn explore_forward(
     bound: &impl Expansion,
-    hopes: &mut ReachabilityCache,
+    reachability: &mut ReachabilityCache,
     left: &mut usize,
-    goes_on: &dyn Fn() -> bool,
+    may_continue: &dyn Fn() -> bool,
 ) -> Result<Layers, Stop> {
     let initial = bound.initial().into_iter();
     let mut layers = Layers::from([(0, initial.map(|(_, state)| state).collect())]);
     let limits = Limits {
         nodes: left.saturating_mul(NODES),
-        may_continue: goes_on,
+        may_continue,
     };
     let mut cell = 0;
     loop {
-        if !goes_on() {
+        if !may_continue() {
             return Err(Stop::Interrupted);
         }
         let states = layers.remove(&cell).unwrap_or_default();
-        bound.expand(cell as usize, &states, &mut layers, hopes, &limits)?;
+        bound.expand(cell as usize, &states, &mut layers, reachability, &limits)?;
         let new = layers.range(cell..).map(|(_, states)| states.len());
         if new.sum::<usize>() > *left {
             return Err(Stop::TooManyStates);

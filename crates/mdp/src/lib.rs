@@ -78,7 +78,7 @@ use restricted_policy::FIRST_STATES_DIVISOR;
 
 /// Bounds the success probability of the best executor without foresight.
 ///
-/// `goes_on` is called regularly; if it returns `false`, the answer contains the bounds found so
+/// `may_continue` is called regularly; if it returns `false`, the answer contains the bounds found so
 /// far.
 ///
 /// # Errors
@@ -87,7 +87,7 @@ pub fn optimum(
     task: &Task,
     model: &WorldModel,
     settings: &Settings,
-    goes_on: &dyn Fn() -> bool,
+    may_continue: &dyn Fn() -> bool,
 ) -> Result<TimedOptimum, NotTabulated> {
     let world = TimedWorld::new(task, model, settings);
     let horizon = world.as_ref().ok().map(|world| world.horizon);
@@ -96,7 +96,7 @@ pub fn optimum(
         1.0,
         settings.most_states / FIRST_STATES_DIVISOR,
         settings,
-        goes_on,
+        may_continue,
     );
     if search.best.is_some() && 1.0 - search.lower() <= settings.gap {
         return Ok(TimedOptimum {
@@ -110,9 +110,12 @@ pub fn optimum(
         lower: search.lower(),
         ..TimedOptimum::unknown()
     };
-    if let Some(found) =
-        discrete_events::bounds(&world, settings, discrete_events::Effort::WHOLE, goes_on)?
-    {
+    if let Some(found) = discrete_events::bounds(
+        &world,
+        settings,
+        discrete_events::Effort::WHOLE,
+        may_continue,
+    )? {
         let grid = found.grid;
         known.lower = known.lower.max(grid.lower);
         known.upper = grid.upper;
@@ -127,16 +130,16 @@ pub fn optimum(
             return Ok(known);
         }
     }
-    let mut found = refine_bounds(&world, known, settings, &|_| true, goes_on)?;
+    let mut found = refine_bounds(&world, known, settings, &|_| true, may_continue)?;
     if found.stop == Stop::TooManyStates
         && let Some(kinder) = world.without_uncertain_harm()
     {
         let cells = settings.first_cells.max(1) << found.grids.len();
-        let upper = relaxed_world::bound_from(&kinder, cells, found.lower, settings, goes_on)?;
+        let upper = relaxed_world::bound_from(&kinder, cells, found.lower, settings, may_continue)?;
         found.upper = found.upper.min(upper);
     }
     if found.upper - found.lower > settings.gap && found.stop == Stop::TooManyStates {
-        search.refine(found.upper, settings.most_states, settings, goes_on);
+        search.refine(found.upper, settings.most_states, settings, may_continue);
     }
     if let Some(best) = search.best
         && best.lower >= found.lower

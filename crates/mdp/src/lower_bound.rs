@@ -4,14 +4,14 @@
 use indexmap::IndexSet;
 
 use super::cell_probabilities::CellProbabilities;
-use super::graph::{Choice, Expansion, Layers, Limits, MOST_WAYS, Nodes, Target};
+use super::graph::{Choice, Expansion, Layers, Limits, MAX_WAYS, Nodes, Target};
 use super::process::action_model::Ending;
 use super::process::world::TimedWorld;
 use super::settings::{Side, Stop};
 use super::state::{Phase, ReachabilityCache, State};
 
 /// Maximum number of happenings in one cell; beyond it, the state counts as lost.
-const MOST_ORDERED: usize = 5;
+const MAX_ORDERED: usize = 5;
 
 /// Restrictions on the times and the moves of the agent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -113,16 +113,16 @@ struct Cell<'c> {
 }
 
 impl<'a> LowerBound<'a> {
-    /// Creates the bound. Each restriction (`manner`) is a policy, so its value is a lower bound.
+    /// Creates the bound. Each restriction (`epochs`) is a policy, so its value is a lower bound.
     pub(super) fn new(
         world: &'a TimedWorld,
         chances: &'a CellProbabilities,
-        manner: DecisionEpochs,
+        epochs: DecisionEpochs,
     ) -> Self {
         Self {
             world,
             chances,
-            epochs: manner,
+            epochs,
         }
     }
 
@@ -148,7 +148,7 @@ impl<'a> LowerBound<'a> {
     fn happenings(&self, cell: usize, state: &State) -> Result<Vec<(f64, Vec<Happening>)>, Stop> {
         let mut all = vec![(1.0, Vec::new())];
         let mut split = |ways: &[(f64, Option<Happening>)]| {
-            if all.len() > MOST_WAYS {
+            if all.len() > MAX_WAYS {
                 return;
             }
             let mut longer = Vec::new();
@@ -188,7 +188,7 @@ impl<'a> LowerBound<'a> {
                 ]);
             }
         }
-        if all.len() > MOST_WAYS {
+        if all.len() > MAX_WAYS {
             return Err(Stop::TooManyStates);
         }
         Ok(all)
@@ -202,7 +202,7 @@ impl<'a> LowerBound<'a> {
             return None;
         }
         if !world.is_monotone {
-            return (happenings.len() <= MOST_ORDERED).then(|| {
+            return (happenings.len() <= MAX_ORDERED).then(|| {
                 let mut outcomes = IndexSet::new();
                 self.in_all_orders(state.clone(), happenings, &mut outcomes);
                 outcomes.into_iter().collect()
@@ -215,7 +215,7 @@ impl<'a> LowerBound<'a> {
             Happening::End(..) | Happening::Repeated => false,
         };
         let (harm, rest): (Vec<_>, Vec<_>) = happenings.iter().copied().partition(is_harm);
-        if rest.len() > MOST_ORDERED {
+        if rest.len() > MAX_ORDERED {
             return None;
         }
         let harmed = |state: State| {
@@ -305,7 +305,7 @@ impl Expansion for LowerBound<'_> {
         cell: usize,
         states: &IndexSet<State>,
         later: &mut Layers,
-        hopes: &mut ReachabilityCache,
+        reachability: &mut ReachabilityCache,
         limits: &Limits<'_>,
     ) -> Result<Nodes, Stop> {
         let mut here = Cell {
@@ -313,7 +313,7 @@ impl Expansion for LowerBound<'_> {
             number: cell,
             moments: states.clone(),
             later,
-            reachability: hopes,
+            reachability,
         };
         let mut nodes = Nodes::of(cell);
         while let Some(state) = here.moments.get_index(nodes.len()).cloned() {

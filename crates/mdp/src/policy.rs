@@ -84,7 +84,7 @@ fn can_converge(grids: &[Grid], most_states: usize) -> bool {
 
 impl Policy {
     /// Computes the policy on the finest grid that [`optimum`](super::optimum) finishes; `None` if
-    /// there is none, or if `goes_on` returns `false`.
+    /// there is none, or if `may_continue` returns `false`.
     ///
     /// # Errors
     /// When the task or the world has a feature that the process does not support.
@@ -92,7 +92,7 @@ impl Policy {
         task: &Task,
         model: &WorldModel,
         settings: &Settings,
-        goes_on: &dyn Fn() -> bool,
+        may_continue: &dyn Fn() -> bool,
     ) -> Result<Option<Self>, NotTabulated> {
         let world = TimedWorld::new(task, model, settings)?;
         let optimum = refine_bounds(
@@ -100,9 +100,9 @@ impl Policy {
             TimedOptimum::unknown(),
             settings,
             &|_| true,
-            goes_on,
+            may_continue,
         )?;
-        Self::on_finest(world, optimum, settings, goes_on)
+        Self::on_finest(world, optimum, settings, may_continue)
     }
 
     /// Computes the policy if the bounds are at most two percentage points apart. On a coarse grid,
@@ -120,7 +120,7 @@ impl Policy {
         task: &Task,
         model: &WorldModel,
         settings: &Settings,
-        goes_on: &dyn Fn() -> bool,
+        may_continue: &dyn Fn() -> bool,
     ) -> Result<Option<Self>, NotTabulated> {
         let world = TimedWorld::new(task, model, settings);
         let horizon = world.as_ref().ok().map(|world| world.horizon);
@@ -133,20 +133,20 @@ impl Policy {
             1.0,
             settings.most_states / FIRST_STATES_DIVISOR,
             &sure,
-            goes_on,
+            may_continue,
         );
         if 1.0 - search.lower() <= CERTAINTY_TOLERANCE {
-            return Self::within(search, settings, goes_on);
+            return Self::within(search, settings, may_continue);
         }
         let whole =
             world.and_then(
-                |world| match Self::for_known_times(&world, settings, goes_on)? {
+                |world| match Self::for_known_times(&world, settings, may_continue)? {
                     Some(policy) => Ok(Some(policy)),
-                    None => Self::if_near_optimal_in_full_process(world, settings, goes_on),
+                    None => Self::if_near_optimal_in_full_process(world, settings, may_continue),
                 },
             );
         if !matches!(whole, Ok(Some(_))) && 1.0 - search.lower() <= OPTIMALITY_GAP {
-            return Self::within(search, settings, goes_on);
+            return Self::within(search, settings, may_continue);
         }
         whole
     }
@@ -155,10 +155,14 @@ impl Policy {
     fn for_known_times(
         world: &TimedWorld,
         settings: &Settings,
-        goes_on: &dyn Fn() -> bool,
+        may_continue: &dyn Fn() -> bool,
     ) -> Result<Option<Self>, NotTabulated> {
-        let found =
-            discrete_events::bounds(world, settings, discrete_events::Effort::QUICK, goes_on)?;
+        let found = discrete_events::bounds(
+            world,
+            settings,
+            discrete_events::Effort::QUICK,
+            may_continue,
+        )?;
         let Some(found) =
             found.filter(|found| found.grid.upper - found.grid.lower <= OPTIMALITY_GAP)
         else {
@@ -169,7 +173,7 @@ impl Policy {
         };
         let discrete_events::RestrictedAgent {
             world,
-            epochs: manner,
+            epochs,
         } = within;
         let chances = cell_probabilities_of(&world, found.cells, Side::Below)?;
         let step = exact_step(&world, found.cells);
@@ -179,21 +183,21 @@ impl Policy {
             grids: vec![found.grid],
             ..TimedOptimum::unknown()
         };
-        let acts = (found.cells, manner);
-        Ok(Self::of(world, chances, optimum, step, acts).with_values(settings, goes_on))
+        let acts = (found.cells, epochs);
+        Ok(Self::of(world, chances, optimum, step, acts).with_values(settings, may_continue))
     }
 
     /// Computes the policy in the whole process, if the bounds become close.
     fn if_near_optimal_in_full_process(
         world: TimedWorld,
         settings: &Settings,
-        goes_on: &dyn Fn() -> bool,
+        may_continue: &dyn Fn() -> bool,
     ) -> Result<Option<Self>, NotTabulated> {
         let first = Settings {
             most_states: settings.most_states / FIRST_SHARE,
             ..settings.clone()
         };
-        if grid(&world, settings.first_cells.max(1), &first, goes_on)?.is_err() {
+        if grid(&world, settings.first_cells.max(1), &first, may_continue)?.is_err() {
             return Ok(None);
         }
         let is_promising = |grids: &[Grid]| can_converge(grids, settings.most_states);
@@ -202,12 +206,12 @@ impl Policy {
             TimedOptimum::unknown(),
             settings,
             &is_promising,
-            goes_on,
+            may_continue,
         )?;
         if optimum.upper - optimum.lower > OPTIMALITY_GAP {
             return Ok(None);
         }
-        Self::on_finest(world, optimum, settings, goes_on)
+        Self::on_finest(world, optimum, settings, may_continue)
     }
 
     /// Computes the policy of the best agent that uses only a plan's actions and acts after
@@ -215,7 +219,7 @@ impl Policy {
     fn within(
         search: Search,
         settings: &Settings,
-        goes_on: &dyn Fn() -> bool,
+        may_continue: &dyn Fn() -> bool,
     ) -> Result<Option<Self>, NotTabulated> {
         let Some((world, fit, within)) = search.into_best() else {
             return Ok(None);
@@ -230,14 +234,14 @@ impl Policy {
             ..TimedOptimum::unknown()
         };
         let acts = (fit.cells, DecisionEpochs::AfterHappenings);
-        Ok(Self::of(world, chances, optimum, exact, acts).with_values(settings, goes_on))
+        Ok(Self::of(world, chances, optimum, exact, acts).with_values(settings, may_continue))
     }
 
     fn on_finest(
         world: TimedWorld,
         optimum: TimedOptimum,
         settings: &Settings,
-        goes_on: &dyn Fn() -> bool,
+        may_continue: &dyn Fn() -> bool,
     ) -> Result<Option<Self>, NotTabulated> {
         let finest = optimum.grids.len().checked_sub(1);
         let Some(cells) = finest.map(|halvings| settings.first_cells.max(1) << halvings) else {
@@ -254,7 +258,7 @@ impl Policy {
             exact,
             (cells, DecisionEpochs::Always),
         )
-        .with_values(settings, goes_on))
+        .with_values(settings, may_continue))
     }
 
     /// Creates the policy without the values of states.
@@ -263,14 +267,14 @@ impl Policy {
         chances: CellProbabilities,
         optimum: TimedOptimum,
         step: Rational,
-        (cells, manner): (usize, DecisionEpochs),
+        (cells, epochs): (usize, DecisionEpochs),
     ) -> Self {
         #[allow(clippy::cast_precision_loss, reason = "at most 65,535")]
         let count = cells as f64;
         Self {
             step,
             values: BTreeMap::new(),
-            epochs: manner,
+            epochs,
             discounts: Discounts {
                 cell: 1.0 - EARLINESS_TOLERANCE / count,
                 step: 1.0 - EARLINESS_TOLERANCE / count,
@@ -281,11 +285,11 @@ impl Policy {
         }
     }
 
-    fn with_values(mut self, settings: &Settings, goes_on: &dyn Fn() -> bool) -> Option<Self> {
+    fn with_values(mut self, settings: &Settings, may_continue: &dyn Fn() -> bool) -> Option<Self> {
         let mut left = settings.most_states;
         let bound = LowerBound::new(&self.world, &self.chances, self.epochs);
         let (layers, values) =
-            backward_induction(&bound, &mut left, self.discounts, goes_on).ok()?;
+            backward_induction(&bound, &mut left, self.discounts, may_continue).ok()?;
         let tables = layers.into_iter().zip(values.0.into_values());
         let tables =
             tables.map(|((cell, states), values)| (cell, states.into_iter().zip(values).collect()));
@@ -301,14 +305,14 @@ impl Policy {
     /// Returns the moves in a state at the beginning of a cell, with their values.
     fn values(&self, cell: usize, state: &State) -> Vec<(Move, f64)> {
         let world = &self.world;
-        let mut hopes = ReachabilityCache::new();
-        if state.is_goal(world) || !state.can_reach_goal(world, &mut hopes) {
+        let mut reachability = ReachabilityCache::new();
+        if state.is_goal(world) || !state.can_reach_goal(world, &mut reachability) {
             return Vec::new();
         }
         let bound = LowerBound::new(world, &self.chances, self.epochs);
         let mut later = Layers::new();
         let only = IndexSet::from([state.clone()]);
-        let nodes = bound.expand(cell, &only, &mut later, &mut hopes, &Limits::NONE);
+        let nodes = bound.expand(cell, &only, &mut later, &mut reachability, &Limits::NONE);
         let nodes = nodes.unwrap_or_default();
         let after = later.into_iter().map(|(cell, states)| {
             let values = states.iter().map(|state| self.value(cell, state));

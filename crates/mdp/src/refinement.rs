@@ -47,12 +47,12 @@ pub(super) fn refine_bounds(
     known: TimedOptimum,
     settings: &Settings,
     is_promising: &dyn Fn(&[Grid]) -> bool,
-    goes_on: &dyn Fn() -> bool,
+    may_continue: &dyn Fn() -> bool,
 ) -> Result<TimedOptimum, NotTabulated> {
     let mut answer = known;
     let mut cells = settings.first_cells.max(1);
     loop {
-        match grid(world, cells, settings, goes_on)? {
+        match grid(world, cells, settings, may_continue)? {
             Ok(grid) => {
                 answer.lower = answer.lower.max(grid.lower);
                 answer.upper = answer.upper.min(grid.upper);
@@ -78,18 +78,18 @@ pub(super) fn grid(
     world: &TimedWorld,
     cells: usize,
     settings: &Settings,
-    goes_on: &dyn Fn() -> bool,
+    may_continue: &dyn Fn() -> bool,
 ) -> Result<Result<Grid, Stop>, NotTabulated> {
     if cells >= usize::from(u16::MAX) {
         return Ok(Err(Stop::TooManyStates));
     }
     let mut left = settings.most_states;
     // The lower bound first, because it detects sooner that there are too many states.
-    let lower = match bound(world, (cells, Side::Below), &mut left, goes_on)? {
+    let lower = match bound(world, (cells, Side::Below), &mut left, may_continue)? {
         Ok(value) => value,
         Err(why) => return Ok(Err(why)),
     };
-    let upper = match bound(world, (cells, Side::Above), &mut left, goes_on)? {
+    let upper = match bound(world, (cells, Side::Above), &mut left, may_continue)? {
         Ok(value) => value,
         Err(why) => return Ok(Err(why)),
     };
@@ -106,18 +106,18 @@ pub(super) fn bound(
     world: &TimedWorld,
     (cells, side): (usize, Side),
     left: &mut usize,
-    goes_on: &dyn Fn() -> bool,
+    may_continue: &dyn Fn() -> bool,
 ) -> Result<Result<f64, Stop>, NotTabulated> {
     let chances = cell_probabilities_of(world, cells, side)?;
     let world = &world.for_bound(side);
     Ok(match side {
         Side::Above => {
-            let value = graph::value(&UpperBound::new(world, &chances), left, goes_on);
+            let value = graph::value(&UpperBound::new(world, &chances), left, may_continue);
             value.map(|value| (value + ROUNDING_MARGIN).min(1.0))
         }
         Side::Below => {
             let below = LowerBound::new(world, &chances, DecisionEpochs::Always);
-            let value = graph::value(&below, left, goes_on);
+            let value = graph::value(&below, left, may_continue);
             value.map(|value| (value - ROUNDING_MARGIN).max(0.0))
         }
     })

@@ -44,13 +44,13 @@ pub(super) fn bound_from(
     first_cells: usize,
     lower: f64,
     settings: &Settings,
-    goes_on: &dyn Fn() -> bool,
+    may_continue: &dyn Fn() -> bool,
 ) -> Result<f64, NotTabulated> {
     let mut least: f64 = 1.0;
     let mut cells = first_cells;
     while cells < usize::from(u16::MAX) && least - lower > settings.gap {
         let mut left = settings.most_states;
-        match bound(world, (cells, Side::Above), &mut left, goes_on)? {
+        match bound(world, (cells, Side::Above), &mut left, may_continue)? {
             Ok(upper) => least = least.min(upper),
             Err(_) => break,
         }

@@ -144,7 +144,7 @@ impl Search {
         upper: f64,
         most_states: usize,
         settings: &Settings,
-        goes_on: &dyn Fn() -> bool,
+        may_continue: &dyn Fn() -> bool,
     ) {
         let mut going: Vec<usize> = (0..self.sets.len()).collect();
         while !going.is_empty() {
@@ -153,7 +153,7 @@ impl Search {
                 if upper - self.lower() <= settings.gap {
                     return;
                 }
-                if let Some((found, fit)) = self.sets[place].next(most_states, goes_on) {
+                if let Some((found, fit)) = self.sets[place].next(most_states, may_continue) {
                     left.push(place);
                     if found.lower > self.lower() {
                         self.best = Some(found);
@@ -167,19 +167,19 @@ impl Search {
 }
 
 impl Set {
-    /// Computes the bound on the next grid; `None` if it has too many states, or `goes_on` returns
+    /// Computes the bound on the next grid; `None` if it has too many states, or `may_continue` returns
     /// `false`.
     fn next(
         &mut self,
         most_states: usize,
-        goes_on: &dyn Fn() -> bool,
+        may_continue: &dyn Fn() -> bool,
     ) -> Option<(RestrictedPolicy, FittedGrid)> {
         let fit = fitting(&self.world, self.cells, Side::Below)?;
         let step = fit.step();
         let chances = CellProbabilities::new(&self.world, step, fit.cells, Side::Below).ok()?;
         let bound = LowerBound::new(&self.world, &chances, DecisionEpochs::AfterHappenings);
         let mut left = most_states;
-        let value = graph::value(&bound, &mut left, goes_on).ok()?;
+        let value = graph::value(&bound, &mut left, may_continue).ok()?;
         self.cells *= 2;
         let lower = (value - ROUNDING_MARGIN).max(0.0);
         let within = RestrictedPolicy {

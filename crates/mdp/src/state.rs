@@ -67,13 +67,17 @@ impl State {
             .fold(0, |set, running| set | 1 << running.act)
     }
 
-    pub(super) fn can_reach_goal(&self, world: &TimedWorld, hopes: &mut ReachabilityCache) -> bool {
+    pub(super) fn can_reach_goal(
+        &self,
+        world: &TimedWorld,
+        reachability: &mut ReachabilityCache,
+    ) -> bool {
         if self.is_undecided {
             return false;
         }
         let facts = self.facts | world.tested;
         let (set, happened) = (self.running_actions(), self.happened);
-        *hopes
+        *reachability
             .entry((facts, set, happened))
             .or_insert_with(|| world.can_reach_goal(facts, set, happened))
     }

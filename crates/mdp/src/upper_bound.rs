@@ -8,7 +8,7 @@ mod relaxed_ends;
 use indexmap::IndexSet;
 
 use super::cell_probabilities::CellProbabilities;
-use super::graph::{Choice, Expansion, Layers, Limits, MOST_WAYS, Nodes, Target};
+use super::graph::{Choice, Expansion, Layers, Limits, MAX_WAYS, Nodes, Target};
 use super::process::world::TimedWorld;
 use super::settings::Stop;
 use super::state::{Phase, ReachabilityCache, State};
@@ -129,7 +129,7 @@ fn revealed(
             });
         }
     }
-    if moments.len() > MOST_WAYS {
+    if moments.len() > MAX_WAYS {
         return Err(Stop::TooManyStates);
     }
     Ok(moments)
@@ -142,7 +142,7 @@ fn split<T>(
     ways: &[(f64, T)],
     change: impl Fn(&mut Moment, &T),
 ) -> Vec<(f64, Moment)> {
-    if moments.len() > MOST_WAYS {
+    if moments.len() > MAX_WAYS {
         return moments;
     }
     let mut all = Vec::with_capacity(moments.len());
@@ -171,7 +171,7 @@ impl Expansion for UpperBound<'_> {
         cell: usize,
         states: &IndexSet<State>,
         later: &mut Layers,
-        hopes: &mut ReachabilityCache,
+        reachability: &mut ReachabilityCache,
         limits: &Limits<'_>,
     ) -> Result<Nodes, Stop> {
         let mut here = Cell {
@@ -180,7 +180,7 @@ impl Expansion for UpperBound<'_> {
             moments: IndexSet::new(),
             first: states.len(),
             later,
-            reachability: hopes,
+            reachability,
             reasons: WaitingCache::new(),
         };
         let mut nodes = Nodes::of(cell);

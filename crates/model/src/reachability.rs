@@ -48,7 +48,7 @@ use event::Symbol;
 use fixpoint::{Arguments, Reachable, fixpoint};
 use relaxation::Relaxation;
 
-/// Number of steps between two calls of the caller's `goes_on`.
+/// Number of steps between two calls of the caller's `may_continue`.
 const STEPS_PER_QUESTION: u64 = 8192;
 
 /// Number of created actions between two such calls.
@@ -120,14 +120,18 @@ pub fn ground(task: &Task, settings: &Settings) -> Answer {
     ground_while(task, settings, &mut || true)
 }
 
-/// Like [`ground`], but stops when `goes_on` returns `false`. It is called every few thousand
+/// Like [`ground`], but stops when `may_continue` returns `false`. It is called every few thousand
 /// steps, about once per millisecond, and not again after it has returned `false`.
-pub fn ground_while(task: &Task, settings: &Settings, goes_on: &mut dyn FnMut() -> bool) -> Answer {
+pub fn ground_while(
+    task: &Task,
+    settings: &Settings,
+    may_continue: &mut dyn FnMut() -> bool,
+) -> Answer {
     let (problem, domains) = (task.with_autonomous_changes(), task.domains.clone());
     let mut steps = 0;
     let mut count = || {
         steps += 1;
-        if steps > settings.step_limit || steps % STEPS_PER_QUESTION == 0 && !goes_on() {
+        if steps > settings.step_limit || steps % STEPS_PER_QUESTION == 0 && !may_continue() {
             ControlFlow::Break(())
         } else {
             ControlFlow::Continue(())
@@ -138,7 +142,7 @@ pub fn ground_while(task: &Task, settings: &Settings, goes_on: &mut dyn FnMut() 
     };
     let facts = enter_facts(task, &reachable.relaxation);
     let mut memory = ResultCache::default();
-    let Some(actions) = actions(task, &reachable, &mut memory, goes_on) else {
+    let Some(actions) = actions(task, &reachable, &mut memory, may_continue) else {
         return Answer::LimitReached;
     };
     let all_rules = task.rules();
@@ -231,7 +235,7 @@ fn actions(
     task: &Task,
     reachable: &Reachable,
     memory: &mut ResultCache,
-    goes_on: &mut dyn FnMut() -> bool,
+    may_continue: &mut dyn FnMut() -> bool,
 ) -> Option<Vec<Action>> {
     let mut actions = Vec::new();
     let mut count = 0_usize;
@@ -253,7 +257,7 @@ fn actions(
                 actions.push(action);
             }
             count += 1;
-            if count.is_multiple_of(ACTIONS_PER_QUESTION) && !goes_on() {
+            if count.is_multiple_of(ACTIONS_PER_QUESTION) && !may_continue() {
                 return None;
             }
         }

@@ -10,7 +10,7 @@ const ALL: &str = "all";
 
 /// Largest number of parameters that are all listed if a name is unknown. For more parameters, only
 /// a similar name is suggested.
-const MOST_LISTED: usize = 12;
+const MAX_LISTED: usize = 12;
 
 /// Errors of a text that is not a box of this plan's parameters.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -251,7 +251,7 @@ pub fn find(name: &str, plan: &ParametrizedPlan) -> Result<ParameterId, BoxTextE
             // Names of parameters are similar, so a short list of them helps more than a single
             // suggestion.
             let names = plan.parameters.iter().map(|parameter| &*parameter.name);
-            let names = names.filter(|_| plan.parameters.len() > MOST_LISTED);
+            let names = names.filter(|_| plan.parameters.len() > MAX_LISTED);
             let actions = durations.iter().map(|(_, action, _)| *action);
             Err(BoxTextError::Unknown {
                 name: name.to_owned(),

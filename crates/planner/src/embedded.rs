@@ -134,11 +134,11 @@ fn search_for_plans(
     };
     let limits = reachability::Settings::default();
     let mut is_stopped = false;
-    let mut goes_on = || {
+    let mut may_continue = || {
         is_stopped = observe(&progress).is_break();
         !is_stopped
     };
-    let mut grounding = match reachability::ground_while(grounded, &limits, &mut goes_on) {
+    let mut grounding = match reachability::ground_while(grounded, &limits, &mut may_continue) {
         reachability::Answer::Complete(grounding) => grounding,
         reachability::Answer::LimitReached if is_stopped => {
             return none_found(Stopped::Interrupted, progress.counts);
@@ -163,13 +163,13 @@ fn search_for_plans(
         relevance::keep_relevant(grounded, &mut grounding, situation);
     }
     progress.counts.actions = grounding.actions.len() as u64;
-    let mut goes_on = || observe(&progress).is_continue();
+    let mut may_continue = || observe(&progress).is_continue();
     let wanted = CompileInput {
         situation,
         tuning,
         metric: !settings.first_plan_only && settings.objective == Objective::Metric,
     };
-    let mut compiled = match compile::compile(grounded, &grounding, wanted, &mut goes_on) {
+    let mut compiled = match compile::compile(grounded, &grounding, wanted, &mut may_continue) {
         Ok(compiled) => compiled,
         Err(Failure::Unsupported(unsupported)) => return Answer::Unsupported(unsupported),
         Err(Failure::Stopped) => return none_found(Stopped::Interrupted, progress.counts),

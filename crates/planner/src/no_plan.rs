@@ -24,10 +24,10 @@ pub use conflict::conflict;
 pub use without_value::fluents_without_value;
 
 /// Limit on the objects tried for parameters of actions, for each round (about a second).
-const MOST_STEPS: u64 = 1_000_000;
+const MAX_STEPS: u64 = 1_000_000;
 
 /// Limit on the evaluated effects of instances, for all rounds together (some seconds).
-const MOST_EVALUATIONS: usize = 3_000_000;
+const MAX_EVALUATIONS: usize = 3_000_000;
 
 /// Work for the evaluation of the effects of one instance.
 const EVALUATION_WORK: u64 = 10;
@@ -44,11 +44,11 @@ pub struct Effort<'a> {
 struct EffortExhausted;
 
 impl<'a> Effort<'a> {
-    /// Creates an effort of `work` units, which ends early when `goes_on` returns `false`.
-    pub fn of(work: u64, goes_on: &'a mut dyn FnMut() -> bool) -> Self {
+    /// Creates an effort of `work` units, which ends early when `may_continue` returns `false`.
+    pub fn of(work: u64, may_continue: &'a mut dyn FnMut() -> bool) -> Self {
         Self {
             remaining: work,
-            may_continue: goes_on,
+            may_continue,
         }
     }
 
@@ -65,16 +65,16 @@ impl<'a> Effort<'a> {
 ///
 /// The certificate contains the facts that are reached in the delete relaxation, each with its earliest
 /// time. If these do not suffice, it also contains pairs of facts that are never true together, or a closed
-/// set of states. The work ends early when `goes_on` returns `false`.
+/// set of states. The work ends early when `may_continue` returns `false`.
 ///
 /// # Errors
 /// The reason for the missing certificate, in words. A plan may exist then.
 pub fn no_plan_certificate_from(
     task: &Task,
     situation: &Situation,
-    goes_on: &mut dyn FnMut() -> bool,
+    may_continue: &mut dyn FnMut() -> bool,
 ) -> Result<NoPlan, String> {
-    no_plan_certificate_within(task, situation, &mut Effort::of(u64::MAX, goes_on))
+    no_plan_certificate_within(task, situation, &mut Effort::of(u64::MAX, may_continue))
 }
 
 /// Returns the same as [`no_plan_certificate_from`], within a limit on the work.
@@ -198,10 +198,10 @@ fn add_reachable(
     let mut reached = ReachedFacts::new();
     let mut looks = 0;
     loop {
-        let steps = instances.extend(&reached, MOST_STEPS);
+        let steps = instances.extend(&reached, MAX_STEPS);
         let steps = steps.map_err(|_| too_many())?;
         looks += instances.len();
-        if looks > MOST_EVALUATIONS {
+        if looks > MAX_EVALUATIONS {
             return Err(too_many());
         }
         let work = steps + EVALUATION_WORK * instances.len() as u64;

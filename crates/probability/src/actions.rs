@@ -127,9 +127,9 @@ fn each_combination(lists: &[Vec<ObjectId>], visit: &mut dyn FnMut(&[ObjectId]) 
         };
         list.iter().all(|object| {
             chosen.push(*object);
-            let goes_on = extend(lists, chosen, visit);
+            let may_continue = extend(lists, chosen, visit);
             chosen.pop();
-            goes_on
+            may_continue
         })
     }
     extend(lists, &mut Vec::new(), visit)

@@ -292,8 +292,8 @@ impl<'a> Validation<'a> {
             Event::Fact { fact, truth } => self.execution.observe_fact(&time, *fact, *truth),
             Event::Value { fluent, value } => self.execution.observe_value(&time, *fluent, value),
             // A request with a remark was ignored.
-            Event::Asked(request) if remark.is_none() => self.process_request(request),
-            Event::Asked(_)
+            Event::Requested(request) if remark.is_none() => self.process_request(request),
+            Event::Requested(_)
             | Event::Feedback { .. }
             | Event::PlanMade
             | Event::PlanReady

@@ -21,19 +21,19 @@ pub fn action_values(
     model: &WorldModel,
     planner: Option<Embedded<'_>>,
     settings: Settings,
-    goes_on: &(dyn Fn() -> bool + Sync),
+    may_continue: &(dyn Fn() -> bool + Sync),
 ) -> Result<Arc<dyn ActionValues>, String> {
-    let sets = planner.map(|planner| ActionSets::for_policy(task, model, planner, goes_on));
+    let sets = planner.map(|planner| ActionSets::for_policy(task, model, planner, may_continue));
     let sets = sets.unwrap_or_default();
     let settings = Settings {
         plans: sets.plans,
         fallbacks: sets.fallbacks,
         ..settings
     };
-    let policy = Policy::if_near_optimal(task, model, &settings, goes_on);
+    let policy = Policy::if_near_optimal(task, model, &settings, may_continue);
     match policy.map_err(|error| error.what)? {
         Some(policy) => Ok(Arc::new(policy)),
-        None if goes_on() => Err(
+        None if may_continue() => Err(
             "it would have too many states, or its bounds would stay more than 2 percentage \
              points apart"
                 .to_owned(),

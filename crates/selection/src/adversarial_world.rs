@@ -19,7 +19,7 @@ use elbowroom_stn::uncertain::{Adversary, UncertainNetwork};
 /// after a long but finite time.
 #[derive(Clone, Debug)]
 pub struct AdversarialWorld {
-    spoiler: Adversary,
+    adversary: Adversary,
     plan: StnPlan,
     /// For each action's name, its instances, by start time without deviations.
     instances: BTreeMap<String, Vec<InstanceId>>,
@@ -64,7 +64,7 @@ impl AdversarialWorld {
         let mut happened = vec![None; plan.nodes.len()];
         happened[NodeId::ZERO.index()] = Some(Rational::ZERO);
         Self {
-            spoiler: Adversary::new(
+            adversary: Adversary::new(
                 with_finite_links(&network.network, &latest),
                 network_node(NodeId::ZERO),
             ),
@@ -126,7 +126,7 @@ impl DurationController for AdversarialWorld {
         }
         let is_spoiled = instance.is_some_and(|instance| {
             let end = network_node(self.end_of(instance));
-            self.spoiler.network().is_contingent(end)
+            self.adversary.network().is_contingent(end)
         });
         if let Some(planned) = begun.planned.filter(|_| begun.is_open && !is_spoiled) {
             self.ends.insert(begun.ticket, now + planned);
@@ -157,10 +157,10 @@ impl DurationController for AdversarialWorld {
         if self.running.is_empty() {
             return ending;
         }
-        let links = self.spoiler.ends_now(now, &self.happened);
+        let links = self.adversary.ends_now(now, &self.happened);
         for (ticket, instance) in &self.running {
             let end = network_node(self.end_of(*instance));
-            let link = self.spoiler.network().ending_at(end);
+            let link = self.adversary.network().ending_at(end);
             if link.is_some_and(|link| links.contains(&link)) {
                 ending.push(*ticket);
             }
@@ -171,7 +171,7 @@ impl DurationController for AdversarialWorld {
     fn next_check(&self, now: &Rational) -> Option<Rational> {
         let timed = self.timed.iter().map(|(_, time)| time.clone());
         let ends = self.ends.values().cloned();
-        let look = self.spoiler.next_query_time(now, &self.happened);
+        let look = self.adversary.next_query_time(now, &self.happened);
         timed
             .chain(ends)
             .chain(look)

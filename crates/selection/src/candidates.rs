@@ -187,10 +187,10 @@ impl<'a> Candidates<'a> {
         }
     }
 
-    /// Returns the next plan; `None` if there are no more plans within the limits. `goes_on` is
+    /// Returns the next plan; `None` if there are no more plans within the limits. `may_continue` is
     /// called often, with the number of evaluated states so far; if it returns `false`, there are
     /// no more plans.
-    pub fn next(&mut self, goes_on: &mut dyn FnMut(u64) -> bool) -> Option<Candidate> {
+    pub fn next(&mut self, may_continue: &mut dyn FnMut(u64) -> bool) -> Option<Candidate> {
         loop {
             if let Some(candidate) = self.ready.pop_front() {
                 return Some(candidate);
@@ -199,11 +199,11 @@ impl<'a> Candidates<'a> {
                 return None;
             }
             let is_first = self.answer.is_none();
-            if !goes_on(self.states) || self.budget.is_spent() && !is_first {
+            if !may_continue(self.states) || self.budget.is_spent() && !is_first {
                 return None;
             }
             let variant = self.queue.pop_front()?;
-            self.search(&variant, goes_on);
+            self.search(&variant, may_continue);
             if self.answer.as_ref().is_none_or(|a| a.found().is_none()) {
                 // Variants without an action have no plan if the problem has none.
                 return None;
@@ -233,7 +233,7 @@ impl<'a> Candidates<'a> {
     }
 
     /// Searches for plans of a variant.
-    fn search(&mut self, variant: &Variant, goes_on: &mut dyn FnMut(u64) -> bool) {
+    fn search(&mut self, variant: &Variant, may_continue: &mut dyn FnMut(u64) -> bool) {
         let own = variant.is_problem();
         let (most, improve) = self.most_states(variant);
         if most == 0 {
@@ -291,7 +291,7 @@ impl<'a> Candidates<'a> {
                 None => (most, most_work),
             };
             let is_over = states >= limit || progress.counts.work >= work;
-            if is_over || !goes_on(before + states) {
+            if is_over || !may_continue(before + states) {
                 ControlFlow::Break(())
             } else {
                 ControlFlow::Continue(())

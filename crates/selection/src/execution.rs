@@ -118,7 +118,7 @@ pub struct Execution<'a> {
     settings: RunSettings,
     flow: EnvelopeSettings,
     likelihoods: Arc<Likelihoods>,
-    foresight: PolicyTableCache,
+    policy_tables: PolicyTableCache,
     plan_comparator: Option<Box<dyn PlanComparator>>,
     action_values: Option<Arc<dyn ActionValues>>,
     missing_table_reason: Option<String>,
@@ -165,7 +165,7 @@ impl<'a> Execution<'a> {
             settings: RunSettings::default(),
             flow: EnvelopeSettings::default(),
             likelihoods: Arc::new(Likelihoods::certain()),
-            foresight: PolicyTableCache::default(),
+            policy_tables: PolicyTableCache::default(),
             plan_comparator: None,
             action_values: None,
             missing_table_reason: None,
@@ -235,8 +235,11 @@ impl<'a> Execution<'a> {
     }
 
     /// Reuses policy tables for the same problem and likelihoods from other runs.
-    pub fn with_foresight(self, foresight: PolicyTableCache) -> Self {
-        Self { foresight, ..self }
+    pub fn with_policy_tables(self, policy_tables: PolicyTableCache) -> Self {
+        Self {
+            policy_tables,
+            ..self
+        }
     }
 
     /// Sets the comparator of plans, for executors that use it
@@ -250,9 +253,9 @@ impl<'a> Execution<'a> {
 
     /// Sets the table of action values, for executors that use it
     /// ([`Needs::action_values`](elbowroom_execution::executors::Needs::action_values)).
-    pub fn with_action_values(self, outlook: Option<Arc<dyn ActionValues>>) -> Self {
+    pub fn with_action_values(self, action_values: Option<Arc<dyn ActionValues>>) -> Self {
         Self {
-            action_values: outlook,
+            action_values,
             ..self
         }
     }
@@ -324,10 +327,10 @@ impl<'a> Execution<'a> {
     }
 
     /// See [`Run::with_stop_check`].
-    pub fn with_stop_check(self, is_to_end: impl Fn() -> bool + Send + 'a) -> Self {
-        let is_to_end = Box::new(is_to_end);
+    pub fn with_stop_check(self, must_end: impl Fn() -> bool + Send + 'a) -> Self {
+        let must_end = Box::new(must_end);
         Self {
-            stop_check: is_to_end,
+            stop_check: must_end,
             ..self
         }
     }
@@ -341,7 +344,7 @@ impl<'a> Execution<'a> {
     }
 
     /// Makes the run persistent: it continues after reaching the goal, and accepts further goals in
-    /// PDDL. See [`Run::lasting`].
+    /// PDDL. See [`Run::persistent`].
     pub fn persistent(self, is_lasting: bool) -> Self {
         Self {
             is_persistent: is_lasting,
@@ -376,7 +379,7 @@ impl<'a> Execution<'a> {
                     region: Box::new(ExactRegion),
                     likelihoods: self.likelihoods,
                     comparator: self.plan_comparator.filter(|_| executor.needs_odds()),
-                    policy_cache: self.foresight,
+                    policy_cache: self.policy_tables,
                     order_cache: None,
                     action_values: self.action_values.filter(|_| needs.action_values),
                     rollout: self.rollouts.as_ref().map(|it| it.evaluator()),
@@ -402,7 +405,7 @@ impl<'a> Execution<'a> {
             .with_stop_check(self.stop_check)
             .with_restarts(self.restarts);
         if self.is_persistent {
-            run = run.lasting(read_goal);
+            run = run.persistent(read_goal);
         } else if self.is_interactive {
             run = run.interactive();
         }

@@ -231,7 +231,7 @@ fn fix_running_starts(plan: &mut StnPlan) {
 const FIRST_STEP: i64 = 16;
 
 /// Maximum number of box checks of this search, per parameter.
-const MOST_CHECKS: usize = 64;
+const MAX_CHECKS: usize = 64;
 
 /// The exact envelope, checked point by point. If a plan is beyond exact analysis, the validator
 /// checks its earliest times.
@@ -354,7 +354,7 @@ impl RegionOracle for ExactRegion {
         };
         let settings = SearchSettings {
             relative: Some(Rational::new(1, 2 * FIRST_STEP)),
-            most_checks: Some(MOST_CHECKS * plan.parameters.len()),
+            most_checks: Some(MAX_CHECKS * plan.parameters.len()),
             ..SearchSettings::default()
         };
         let Ok(run) = irr(&mut oracle, &settings, &mut |_| ControlFlow::Continue(())) else {

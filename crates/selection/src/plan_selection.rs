@@ -23,23 +23,23 @@ use crate::renumbering::renumbered;
 use crate::rollouts::{RolloutSession, Rollouts};
 
 /// Maximum number of compared plans.
-const MOST_PLANS: usize = 12;
+const MAX_PLANS: usize = 12;
 
 /// Maximum number of variants of the problem to plan for.
-const MOST_SEARCHES: usize = 20;
+const MAX_SEARCHES: usize = 20;
 
 /// Number of samples of the first plan before other plans are made.
 const FIRST_SAMPLES: u64 = 100;
 
 /// Maximum number of actions in sampled plans, summed over all samples. It limits the time of the
 /// choice among plans of hundreds of actions.
-const MOST_ACTIONS: u64 = 50_000;
+const MAX_ACTIONS: u64 = 50_000;
 
 /// Minimum number of states for all plans but the first.
 const LEAST_OTHER_STATES: u64 = 10_000;
 
 /// Maximum number of partial orders in the search for the likeliest order of a plan.
-const MOST_SEQUENCES: usize = 5_000;
+const MAX_SEQUENCES: usize = 5_000;
 
 /// Criterion for the first plan of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -217,14 +217,14 @@ impl PlanSelector<'_> {
             most_states: self.most_states,
             improve_states: self.improve_states,
             other_states: self.most_states.max(LEAST_OTHER_STATES),
-            searches: MOST_SEARCHES,
+            searches: MAX_SEARCHES,
             work: self.work,
             first_plan_factor: FIRST_PLAN_FACTOR,
         };
         let settings = self.settings.clone();
         let mut source = Candidates::new(&thought, situation, world, settings, limits);
-        let goes_on = &mut |_| (self.may_continue)();
-        let Some(first) = source.next(goes_on) else {
+        let may_continue = &mut |_| (self.may_continue)();
+        let Some(first) = source.next(may_continue) else {
             return Err(self.no_plan(task, situation, source.answer()));
         };
         let mut plans = vec![first];
@@ -236,7 +236,7 @@ impl PlanSelector<'_> {
                 likelihoods,
                 reorders,
             } => {
-                plans.extend(std::iter::from_fn(|| source.next(goes_on)).take(MOST_PLANS - 1));
+                plans.extend(std::iter::from_fn(|| source.next(may_continue)).take(MAX_PLANS - 1));
                 let odds = |plan: &Candidate| {
                     let odds = order_probability(&thought, &plan.plan, likelihoods, *reorders);
                     Value::Exact(odds.unwrap_or_default())
@@ -274,21 +274,21 @@ impl PlanSelector<'_> {
             self.may_continue,
         );
         let mut first = Vec::new();
-        let mut left = MOST_ACTIONS;
+        let mut left = MAX_ACTIONS;
         let mut afford = |plan: &Candidate, floor: u64| {
             left = left.saturating_sub(plan.plan.steps.len() as u64);
             left > floor && !budget.is_spent() && (self.may_continue)()
         };
         for sample in 0..FIRST_SAMPLES {
-            if !afford(&plans[0], MOST_ACTIONS / 2) {
+            if !afford(&plans[0], MAX_ACTIONS / 2) {
                 break;
             }
             first.push(tryout.succeeds(&plans[0].plan, sample));
         }
         let successes = first.iter().filter(|success| **success).count() as u64;
         if successes < first.len() as u64 && !budget.is_spent() && (self.may_continue)() {
-            let goes_on = &mut |_| (self.may_continue)();
-            plans.extend(std::iter::from_fn(|| source.next(goes_on)).take(MOST_PLANS - 1));
+            let may_continue = &mut |_| (self.may_continue)();
+            plans.extend(std::iter::from_fn(|| source.next(may_continue)).take(MAX_PLANS - 1));
         }
         if plans.len() == 1 {
             let samples = first.len() as u64;
@@ -360,7 +360,7 @@ fn order_probability(
     }
     let mut search = search.beginning_with(as_planned);
     let found = search.best_order(&initial, &mut |progress| {
-        if progress.sequences >= MOST_SEQUENCES {
+        if progress.sequences >= MAX_SEQUENCES {
             ControlFlow::Break(())
         } else {
             ControlFlow::Continue(())

@@ -89,7 +89,7 @@ impl Embedded<'_> {
                 None => (self.most_states, most_work),
             };
             *states = progress.counts.evaluated;
-            let is_wanted = self.may_continue.is_none_or(|goes_on| goes_on());
+            let is_wanted = self.may_continue.is_none_or(|may_continue| may_continue());
             let is_over = progress.counts.evaluated >= limit || progress.counts.work >= work;
             if is_over || !is_wanted {
                 ControlFlow::Break(())
@@ -100,9 +100,9 @@ impl Embedded<'_> {
         match answer {
             embedded::Answer::Plan { found, .. } => PlanAnswer::Plan(found.plan),
             answer => {
-                let goes_on = || self.may_continue.is_none_or(|goes_on| goes_on());
+                let may_continue = || self.may_continue.is_none_or(|may_continue| may_continue());
                 let limits = (self.most_states, self.certificate_work);
-                without_plan(&answer, (task, situation), limits, &goes_on)
+                without_plan(&answer, (task, situation), limits, &may_continue)
             }
         }
     }
@@ -114,19 +114,19 @@ pub(crate) fn without_plan(
     answer: &embedded::Answer,
     (task, situation): (&Task, &Situation),
     (most_states, certificate_work): (u64, u64),
-    goes_on: &dyn Fn() -> bool,
+    may_continue: &dyn Fn() -> bool,
 ) -> PlanAnswer {
     let why = match answer {
         embedded::Answer::Unsolvable { proof, .. } => {
-            let goes_on = &mut || goes_on();
-            return refuted_answer((task, situation), proof, certificate_work, goes_on);
+            let may_continue = &mut || may_continue();
+            return refuted_answer((task, situation), proof, certificate_work, may_continue);
         }
         // This answer does not depend on the existence of plans.
         embedded::Answer::Unsupported(unsupported) => {
             let why = unsupported.to_string();
             return PlanAnswer::Failed { why };
         }
-        _ if !goes_on() => "planning was interrupted".to_owned(),
+        _ if !may_continue() => "planning was interrupted".to_owned(),
         embedded::Answer::NoneFound {
             stopped,
             without_self_overlap,
@@ -204,10 +204,10 @@ fn refuted_answer(
     (task, situation): (&Task, &Situation),
     proof: &Proof,
     work: u64,
-    goes_on: &mut dyn FnMut() -> bool,
+    may_continue: &mut dyn FnMut() -> bool,
 ) -> PlanAnswer {
     let from = with_any_ends(situation);
-    match no_plan_certificate_within(task, &from, &mut Effort::of(work, goes_on)) {
+    match no_plan_certificate_within(task, &from, &mut Effort::of(work, may_continue)) {
         Ok(_) => PlanAnswer::Unsolvable,
         Err(why) => {
             let none = match proof {

@@ -16,17 +16,17 @@ use crate::planners::Embedded;
 use crate::rollouts::{Replanning, RolloutSession, Rollouts};
 
 /// Maximum number of plans.
-const MOST_PLANS: usize = 8;
+const MAX_PLANS: usize = 8;
 
 /// Maximum number of variants of the problem, and of states for all plans but the first.
-const MOST_SEARCHES: usize = 8;
-const MOST_VARIANT_STATES: u64 = 10_000;
+const MAX_SEARCHES: usize = 8;
+const MAX_VARIANT_STATES: u64 = 10_000;
 
 /// Number of samples of the first plan to find fallbacks; maximum number of states for all later
 /// plans; maximum number of fallbacks.
 const SAMPLES: u64 = 24;
-const MOST_FALLBACK_STATES: u64 = 10_000;
-const MOST_FALLBACKS: usize = 4;
+const MAX_FALLBACK_STATES: u64 = 10_000;
+const MAX_FALLBACKS: usize = 4;
 
 /// Sets of actions for restricted policies.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -46,9 +46,9 @@ impl ActionSets {
         task: &Task,
         world: &WorldModel,
         embedded: Embedded<'_>,
-        goes_on: &(dyn Fn() -> bool + Sync),
+        may_continue: &(dyn Fn() -> bool + Sync),
     ) -> Self {
-        Self::of(task, world, embedded, &|_| true, goes_on)
+        Self::of(task, world, embedded, &|_| true, may_continue)
     }
 
     /// Computes the sets for a [policy](elbowroom_mdp::Policy); empty if there would be no table even for
@@ -57,7 +57,7 @@ impl ActionSets {
         task: &Task,
         world: &WorldModel,
         embedded: Embedded<'_>,
-        goes_on: &(dyn Fn() -> bool + Sync),
+        may_continue: &(dyn Fn() -> bool + Sync),
     ) -> Self {
         let is_of_use = |first: &[String]| {
             let settings = Settings {
@@ -66,7 +66,7 @@ impl ActionSets {
             };
             elbowroom_mdp::is_supported(task, world, &settings)
         };
-        Self::of(task, world, embedded, &is_of_use, goes_on)
+        Self::of(task, world, embedded, &is_of_use, may_continue)
     }
 
     fn of(
@@ -74,13 +74,13 @@ impl ActionSets {
         world: &WorldModel,
         embedded: Embedded<'_>,
         is_of_use: &dyn Fn(&[String]) -> bool,
-        goes_on: &(dyn Fn() -> bool + Sync),
+        may_continue: &(dyn Fn() -> bool + Sync),
     ) -> Self {
         let limits = Limits {
             most_states: embedded.most_states,
             improve_states: embedded.improve_states,
-            other_states: MOST_VARIANT_STATES,
-            searches: MOST_SEARCHES,
+            other_states: MAX_VARIANT_STATES,
+            searches: MAX_SEARCHES,
             work: embedded.work,
             first_plan_factor: embedded.first_plan_factor,
         };
@@ -88,20 +88,20 @@ impl ActionSets {
         let thought = task.with_own_table();
         let situation = Situation::initial(&thought);
         let replanning = Replanning {
-            all_states: MOST_FALLBACK_STATES,
+            all_states: MAX_FALLBACK_STATES,
             ..Replanning::within(&embedded)
         };
         let mut source =
             Candidates::new(&thought, &situation, Some(world), embedded.settings, limits);
-        let mut next = || source.next(&mut |_| goes_on()).map(|found| found.plan);
+        let mut next = || source.next(&mut |_| may_continue()).map(|found| found.plan);
         let Some(first) = next().filter(|first| is_of_use(&names(first))) else {
             return Self::default();
         };
-        let others = std::iter::from_fn(next).take(MOST_PLANS - 1);
+        let others = std::iter::from_fn(next).take(MAX_PLANS - 1);
         let mut plans = vec![names(&first)];
         plans.extend(others.map(|plan| names(&plan)));
         let fallbacks = if elbowroom_mdp::has_known_times(task, world) {
-            fallbacks(&thought, world, replanning, &first, goes_on)
+            fallbacks(&thought, world, replanning, &first, may_continue)
         } else {
             Vec::new()
         };
@@ -115,7 +115,7 @@ fn fallbacks(
     world: &WorldModel,
     replanning: Replanning,
     first: &TimeTriggeredPlan,
-    goes_on: &(dyn Fn() -> bool + Sync),
+    may_continue: &(dyn Fn() -> bool + Sync),
 ) -> Vec<Vec<String>> {
     let work = replanning.work;
     let rollouts = Rollouts {
@@ -132,10 +132,10 @@ fn fallbacks(
         replanning: Some(replanning),
         is_ready: true,
     };
-    let mut tryout = RolloutSession::new(task, rollouts, work, goes_on);
+    let mut tryout = RolloutSession::new(task, rollouts, work, may_continue);
     let mut found: IndexMap<Vec<String>, usize> = IndexMap::new();
     for sample in 0..SAMPLES {
-        if !goes_on() {
+        if !may_continue() {
             break;
         }
         let mut before = names(first);
@@ -153,7 +153,7 @@ fn fallbacks(
         }
     }
     found.sort_by(|_, one, _, other| other.cmp(one));
-    found.into_keys().take(MOST_FALLBACKS).collect()
+    found.into_keys().take(MAX_FALLBACKS).collect()
 }
 
 /// Returns the names of a plan's actions.

@@ -49,11 +49,11 @@ const TOLERATED_AFTER_FAILURE: usize = 1;
 const FIRST_CONFIRMATION_SAMPLE: u64 = 1_000_000;
 
 /// Maximum number of other plans, and of states for all of them but the first.
-const MOST_PLANS: usize = 4;
+const MAX_PLANS: usize = 4;
 const PLAN_STATES: u64 = 2_000;
 
 /// Maximum number of variants of the problem to plan for.
-const MOST_SEARCHES: usize = 6;
+const MAX_SEARCHES: usize = 6;
 
 /// Maximum number of states for all new plans in the samples of one scene.
 const SAMPLE_STATES: u64 = 4_000;
@@ -254,8 +254,8 @@ impl RolloutPolicy {
         };
         rollouts.settings.planning_time = PlanningTime::Seconds(planning_time.clone());
         rollouts.settings.monitors_slack = false;
-        rollouts.settings.plans_aside = false;
-        rollouts.settings.readies_aside = false;
+        rollouts.settings.plans_in_background = false;
+        rollouts.settings.prepares_in_background = false;
         if let Some(replanning) = &mut rollouts.replanning {
             replanning.improve_states = 0;
             replanning.all_states = SAMPLE_STATES;
@@ -404,14 +404,14 @@ impl RolloutPolicy {
             most_states: self.planner.most_states,
             improve_states: self.planner.improve_states,
             other_states: PLAN_STATES,
-            searches: MOST_SEARCHES,
+            searches: MAX_SEARCHES,
             work: self.planner.work,
             first_plan_factor: self.planner.first_plan_factor,
         };
         let (world, settings) = (&*self.rollouts.world, self.planner.settings.clone());
         let mut source = Candidates::new(task, situation, Some(world), settings, limits);
         let plans = std::iter::from_fn(|| source.next(&mut |_| true));
-        plans.take(MOST_PLANS).map(|it| it.plan).collect()
+        plans.take(MAX_PLANS).map(|it| it.plan).collect()
     }
 
     fn choose(

@@ -46,7 +46,7 @@ pub struct Rollouts {
 }
 
 /// Maximum number of states of a search for a plan in a sample.
-const MOST_STATES: u64 = 20_000;
+const MAX_STATES: u64 = 20_000;
 
 /// Settings of replanning in rollouts.
 #[derive(Clone, Debug)]
@@ -69,7 +69,7 @@ impl Replanning {
     /// as many for all plans together. If no plan exists, a single sample must not use up the work
     /// of all.
     pub fn within(planner: &Embedded<'_>) -> Self {
-        let most_states = planner.most_states.min(MOST_STATES);
+        let most_states = planner.most_states.min(MAX_STATES);
         Self {
             settings: planner.settings.clone(),
             most_states,
@@ -96,7 +96,7 @@ impl<'a> RolloutSession<'a> {
         task: &Task,
         mut rollouts: Rollouts,
         work: u64,
-        goes_on: &'a (dyn Fn() -> bool + Sync),
+        may_continue: &'a (dyn Fn() -> bool + Sync),
     ) -> Self {
         if rollouts.executor.uses_world_model() {
             rollouts.executor = ExecutorSpec::default();
@@ -106,8 +106,8 @@ impl<'a> RolloutSession<'a> {
             rollouts.settings.planning_time = PlanningTime::Seconds(Rational::ZERO);
         }
         rollouts.settings.monitors_slack = false;
-        rollouts.settings.plans_aside = false;
-        rollouts.settings.readies_aside = false;
+        rollouts.settings.plans_in_background = false;
+        rollouts.settings.prepares_in_background = false;
         let planner: Box<dyn Planner + 'a> = match &rollouts.replanning {
             None => Box::new(NoPlanner),
             Some(replanning) => {
@@ -121,7 +121,7 @@ impl<'a> RolloutSession<'a> {
                         // Samples need no proof that no plan exists.
                         certificate_work: 0,
                         clock: None,
-                        may_continue: Some(goes_on),
+                        may_continue: Some(may_continue),
                     },
                     remaining_states: replanning.all_states,
                     budget: work::Budget::new(work),
@@ -187,7 +187,7 @@ impl<'a> RolloutSession<'a> {
             .by(rollouts.executor.clone())
             .with_settings(rollouts.settings.clone())
             .with_likelihoods(Arc::clone(&rollouts.likelihoods))
-            .with_foresight(self.foresight.clone())
+            .with_policy_tables(self.foresight.clone())
             .with_planner(ScriptedPlanner {
                 first: later,
                 planner: &mut *self.planner,

@@ -182,20 +182,20 @@ impl Distribution {
 /// float to represent each of them.
 pub fn rounded(value: f64, resolution: &Rational) -> Rational {
     let steps = (value / resolution.to_f64()).round();
-    if steps.abs() > MOST_STEPS
+    if steps.abs() > MAX_STEPS
         && let Some(exact) = Rational::from_f64_as_written(value)
     {
         return exact;
     }
     // After this, only NaN is not bounded.
-    let bounded = steps.clamp(-MOST_STEPS, MOST_STEPS);
+    let bounded = steps.clamp(-MAX_STEPS, MAX_STEPS);
     #[allow(clippy::cast_possible_truncation, reason = "just bounded, and whole")]
     let steps = bounded as i64;
     Rational::from(steps) * resolution
 }
 
 /// Beyond this number, floats do not represent all integers (the exact limit is 2⁵³).
-const MOST_STEPS: f64 = 9e15;
+const MAX_STEPS: f64 = 9e15;
 
 #[cfg(test)]
 mod tests {

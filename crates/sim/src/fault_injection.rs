@@ -179,7 +179,7 @@ fn opposite(event: &Event) -> Event {
             measured: Vec::new(),
         },
         Event::Feedback { .. }
-        | Event::Asked(_)
+        | Event::Requested(_)
         | Event::PlanMade
         | Event::PlanReady
         | Event::Unintelligible { .. } => event.clone(),

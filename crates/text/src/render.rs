@@ -10,7 +10,7 @@ const WIDTH: usize = 100;
 /// Maximum length of a shown line. Cutting longer ones takes time, and they are usually generated.
 const LONGEST_LINE: usize = 20_000;
 /// Maximum number of lines shown of one place.
-const MOST_LINES: usize = 4;
+const MAX_LINES: usize = 4;
 
 impl Diagnostic {
     /// Returns the finding with an excerpt of the text, for a terminal.
@@ -52,7 +52,7 @@ fn excerpt(label: &Label, is_primary: bool) -> Element<'_> {
     let source = &label.source;
     let (first, column) = source.position(label.span.start);
     let (last, _) = source.position(label.span.end);
-    let last = last.min(first + MOST_LINES - 1);
+    let last = last.min(first + MAX_LINES - 1);
     let shown = source.line(first).start..source.line(last).end;
     if shown.len() > LONGEST_LINE {
         return Origin::path(source.name())

@@ -3,7 +3,7 @@
 /// Maximum length of a compared name; the comparison takes quadratic time.
 const LONGEST: usize = 60;
 /// Maximum number of compared candidates, for the same reason.
-const MOST_CANDIDATES: usize = 2000;
+const MAX_CANDIDATES: usize = 2000;
 
 /// Returns the candidate most similar to `name`, if one is similar. Ignores case.
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
@@ -15,7 +15,7 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
     let tolerated = (name.len() / 3).clamp(1, 3);
     candidates
         .into_iter()
-        .take(MOST_CANDIDATES)
+        .take(MAX_CANDIDATES)
         .filter(|candidate| candidate.len().abs_diff(length) <= tolerated)
         .map(|candidate| {
             let letters: Vec<char> = candidate.to_ascii_lowercase().chars().collect();

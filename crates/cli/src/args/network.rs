@@ -31,7 +31,7 @@ pub(crate) struct NetworkArgs {
     #[arg(long, value_enum, default_value_t = DurationsChoice::Given, requires = "simulate")]
     pub(crate) durations: DurationsChoice,
     /// Number of branches after which weak controllability, which can be hard, is left undecided
-    #[arg(long, value_name = "N", default_value_t = elbowroom::network::MOST_BRANCHES, value_parser = count)]
+    #[arg(long, value_name = "N", default_value_t = elbowroom::network::MAX_BRANCHES, value_parser = count)]
     #[arg(allow_negative_numbers = true)]
     pub(crate) branches: usize,
     /// Print the answer as one JSON document

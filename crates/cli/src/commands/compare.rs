@@ -26,9 +26,9 @@ use elbowroom_executive::messages::io_error_message;
 /// Folder for the traces of failed trials, inside the folder of the results.
 pub(crate) const FAILURES: &str = "failures";
 /// Maximum number of kinds of failure, for each executor and world, whose trace is written.
-const MOST_PER_CELL: usize = 3;
+const MAX_PER_CELL: usize = 3;
 /// Maximum number of traces written in total.
-const MOST_FAILURES: usize = 60;
+const MAX_FAILURES: usize = 60;
 
 /// Runs an experiment or a part of it, or merges parts.
 pub(crate) fn run(arguments: &CompareArgs, output: &mut Output) -> Answer {
@@ -192,7 +192,7 @@ fn write_failures(
     let mut failed = if answer.is_interrupted() {
         Vec::new()
     } else {
-        answer.failed_trials(MOST_PER_CELL, MOST_FAILURES)
+        answer.failed_trials(MAX_PER_CELL, MAX_FAILURES)
     };
     failed.retain(|failed| experiment.is_repeatable(failed));
     if !failed.is_empty() {

@@ -10,7 +10,7 @@ use crate::skipped::skipped;
 const EXPECTED: &str = include_str!("bug_reports/expected.txt");
 
 /// Maximum number of decimal digits in a printed plan.
-const MOST_DIGITS: usize = 9;
+const MAX_DIGITS: usize = 9;
 
 /// Expected answer of one command.
 struct Expectation {
@@ -147,7 +147,7 @@ fn objection_to_plan(folder: &Path, problem: &[String], written: &Path) -> Optio
             let is_decimal = number
                 .bytes()
                 .all(|byte| byte.is_ascii_digit() || byte == b'.');
-            if !is_decimal || digits > MOST_DIGITS {
+            if !is_decimal || digits > MAX_DIGITS {
                 return Some(format!("other tools do not read `{number}`:\n{plan}"));
             }
         }

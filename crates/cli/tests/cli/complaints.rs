@@ -286,7 +286,7 @@ fn pause_starts_nothing_and_stop_cancels_running_actions() {
     let task = task(ERRANDS, problem);
     let asked = |time: i64, request: Request| Observation {
         time: time.into(),
-        event: Event::Asked(request),
+        event: Event::Requested(request),
     };
     let (name, goal) = ("again".to_owned(), "(not (here cup))".to_owned());
     let mut world = Toy {
@@ -628,7 +628,7 @@ fn robots_act_concurrently_and_accept_goals_during_execution() {
     let mut world = Toy {
         coming: vec![Observation {
             time: Rational::from(2),
-            event: Event::Asked(Request::Pursue {
+            event: Event::Requested(Request::Pursue {
                 name,
                 goal,
                 terms: GoalTerms::default(),

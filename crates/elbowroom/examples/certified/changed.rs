@@ -12,7 +12,7 @@ use crate::statistics::Sums;
 const LIMIT: Duration = Duration::from_secs(1);
 
 /// Maximum number of initial facts to remove, one in each variant.
-const MOST_FACTS: usize = 8;
+const MAX_FACTS: usize = 8;
 
 /// Plans for each variant of a problem that has a plan.
 pub(crate) fn plan_variants(name: &str, task: &Task, sums: &mut Sums) {
@@ -34,9 +34,9 @@ pub(crate) fn plan_variants(name: &str, task: &Task, sums: &mut Sums) {
         }
     }
     let facts = task.problem().initial_facts.len();
-    for number in 0..facts.min(MOST_FACTS) {
+    for number in 0..facts.min(MAX_FACTS) {
         // Distributed evenly over all facts.
-        let left_out = number * facts / facts.min(MOST_FACTS);
+        let left_out = number * facts / facts.min(MAX_FACTS);
         let mut problem = task.problem().clone();
         let (predicate, objects) = problem.initial_facts.remove(left_out);
         let fact = task.problem().apply_predicate(predicate, &objects);

@@ -47,8 +47,8 @@ impl Sums {
             Proof::WithoutSelfOverlap { .. } => "exhausted without self-overlap",
         };
         let begin = Instant::now();
-        let mut goes_on = || begin.elapsed() < LIMIT;
-        let found = no_plan_certificate_from(task, situation, &mut goes_on);
+        let mut may_continue = || begin.elapsed() < LIMIT;
+        let found = no_plan_certificate_from(task, situation, &mut may_continue);
         let made = begin.elapsed().as_secs_f64();
         let (kind, figures) = match found {
             Ok(certificate) => {

@@ -126,10 +126,10 @@ fn timed(
     options: &Options,
 ) -> Result<(Boxed, Duration), String> {
     let begin = Instant::now();
-    let goes_on = || begin.elapsed() < options.time_per_box;
+    let may_continue = || begin.elapsed() < options.time_per_box;
     let search = Search {
         most_checks: usize::MAX,
-        goes_on: &goes_on,
+        may_continue: &may_continue,
     };
     let boxed = boxed(&subject.task, plan, guarantee, search)?;
     Ok((boxed, begin.elapsed()))

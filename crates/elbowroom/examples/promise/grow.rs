@@ -77,10 +77,10 @@ fn line(rows: &[&Row]) -> String {
 fn row(source: &Source, options: &Options) -> Result<Row, String> {
     let subject = Subject::of_source(source, &options.planning)?;
     let begin = Instant::now();
-    let goes_on = || begin.elapsed() < options.time_per_box;
+    let may_continue = || begin.elapsed() < options.time_per_box;
     let search = Search {
         most_checks: usize::MAX,
-        goes_on: &goes_on,
+        may_continue: &may_continue,
     };
     let ready = Ready::new(&subject, search)?;
     let plan = Arc::new(ready.open.plan.clone());
@@ -88,7 +88,7 @@ fn row(source: &Source, options: &Options) -> Result<Row, String> {
     let mut oracle = oracle.map_err(|_| "beyond exact analysis")?;
     let mut is_sharp = true;
     let sharp = sharpen(&mut oracle, ready.envelope(), &mut || {
-        is_sharp &= goes_on();
+        is_sharp &= may_continue();
         if is_sharp {
             ControlFlow::Continue(())
         } else {

@@ -59,10 +59,10 @@ fn row(source: &Source, options: &Options) -> Result<Row, String> {
     let subject = Subject::of_source(source, &options.planning)?;
     let label = format!("{} {}", subject.family, subject.name);
     let begin = Instant::now();
-    let goes_on = || begin.elapsed() < options.time_per_box;
+    let may_continue = || begin.elapsed() < options.time_per_box;
     let search = Search {
         most_checks: usize::MAX,
-        goes_on: &goes_on,
+        may_continue: &may_continue,
     };
     let ready = Ready::new(&subject, search).inspect_err(|why| eprintln!("{label}: {why}"))?;
     let failed = EXECUTORS.map(|executor| {
@@ -78,10 +78,10 @@ fn row(source: &Source, options: &Options) -> Result<Row, String> {
     let mut is_order_missed = false;
     if let Some(turned) = subject.turned_round() {
         let begin = Instant::now();
-        let goes_on = || begin.elapsed() < options.time_per_box;
+        let may_continue = || begin.elapsed() < options.time_per_box;
         let search = Search {
             most_checks: 20,
-            goes_on: &goes_on,
+            may_continue: &may_continue,
         };
         let failures = match &turned {
             Ok(turned) => match Ready::new(turned, search) {

@@ -60,10 +60,10 @@ fn line(tallies: &[&Tally]) -> String {
 fn tally(source: &Source, options: &Options) -> Result<(String, Tally), String> {
     let subject = Subject::of_source(source, &options.planning)?;
     let begin = Instant::now();
-    let goes_on = || begin.elapsed() < options.time_per_box;
+    let may_continue = || begin.elapsed() < options.time_per_box;
     let search = Search {
         most_checks: usize::MAX,
-        goes_on: &goes_on,
+        may_continue: &may_continue,
     };
     let ready = Ready::new(&subject, search)?;
     let worlds = Worlds::new(&subject.task, &ready.open, ready.envelope());

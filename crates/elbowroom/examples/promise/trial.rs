@@ -46,7 +46,7 @@ pub(crate) struct Outcome {
 pub(crate) struct Search<'a> {
     pub(crate) most_checks: usize,
     /// Returns `false` to stop.
-    pub(crate) goes_on: &'a (dyn Fn() -> bool + Sync),
+    pub(crate) may_continue: &'a (dyn Fn() -> bool + Sync),
 }
 
 /// Box of a plan with all durations as parameters, and its search effort.
@@ -257,7 +257,7 @@ pub(crate) fn boxed(
         ..elbowroom::envelope::Settings::default()
     };
     let run = irr(&mut oracle, &settings, &mut |_| {
-        if (search.goes_on)() {
+        if (search.may_continue)() {
             ControlFlow::Continue(())
         } else {
             ControlFlow::Break(())

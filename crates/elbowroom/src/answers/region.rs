@@ -25,7 +25,7 @@ pub use measure::{Measure, Share};
 pub use picture::{Others, PictureError, Plane, picture};
 
 /// Largest number of positions that are distinguished for a moment inside an action.
-const MOST_POSITIONS: usize = 256;
+const MAX_POSITIONS: usize = 256;
 
 /// The answer as a document (`docs/formats/region-json.md`), with the plan and the region.
 #[derive(Clone, Debug)]
@@ -169,7 +169,7 @@ pub fn region(
         Err(error) => return Err(error.into()),
     };
     let ranges = DecoupledEnvelope::ranges(&plan);
-    let form = match LinearForm::new(task, &plan, &ranges, &plan.nominal(), MOST_POSITIONS) {
+    let form = match LinearForm::new(task, &plan, &ranges, &plan.nominal(), MAX_POSITIONS) {
         Ok(form) => form,
         Err(Refusal::NoNominalSchedule) => {
             return Ok(outcome(RegionFinding::Unscheduled, Some(plan), None));

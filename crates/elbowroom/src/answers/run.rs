@@ -83,7 +83,7 @@ pub fn run<'a>(
         let millis = shared.get().elapsed().as_millis();
         Rational::new(i64::try_from(millis).unwrap_or(i64::MAX), 1000)
     };
-    let goes_on = || shared.get().flow().is_continue();
+    let may_continue = || shared.get().flow().is_continue();
     let remark = Arc::new(Mutex::new(None));
     let mut findings = None;
     let snapshot = execution.snapshot().cloned();
@@ -100,7 +100,7 @@ pub fn run<'a>(
         })
     });
     if !execution.has_planner() {
-        execution = execution.with_planner(inputs.planner(&clock, &goes_on)?);
+        execution = execution.with_planner(inputs.planner(&clock, &may_continue)?);
     }
     let report = execution
         .with_stop_check(|| matches!(shared.get().flow(), ControlFlow::Break(_)))

@@ -141,14 +141,22 @@ pub struct RunSpec {
     /// The planning time in the world's seconds.
     #[serde(with = "as_text")]
     pub planning_time: PlanningTime,
-    /// `true` if plans are made in the background of the run ([`RunSettings::plans_aside`]); left
+    /// `true` if plans are made in the background of the run ([`RunSettings::plans_in_background`]); left
     /// out if `false`.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub plans_aside: bool,
-    /// `true` if plans are also prepared in the background ([`RunSettings::readies_aside`]); left
+    #[serde(
+        default,
+        rename = "plans_aside",
+        skip_serializing_if = "std::ops::Not::not"
+    )]
+    pub plans_in_background: bool,
+    /// `true` if plans are also prepared in the background ([`RunSettings::prepares_in_background`]); left
     /// out if `false`.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub readies_aside: bool,
+    #[serde(
+        default,
+        rename = "readies_aside",
+        skip_serializing_if = "std::ops::Not::not"
+    )]
+    pub prepares_in_background: bool,
     /// Speed of the world's clock relative to the wall clock; without one, the run does not wait
     /// for the wall clock.
     #[serde(with = "positive::nullable")]
@@ -207,7 +215,7 @@ impl NamedText {
 }
 
 /// Default limit on the states that the embedded planner examines for one plan: more than any planning budget allows.
-pub const MOST_STATES: u64 = 1_000_000_000;
+pub const MAX_STATES: u64 = 1_000_000_000;
 
 impl RunSpec {
     /// Creates a run of this problem with the defaults of the command.
@@ -232,7 +240,7 @@ impl RunSpec {
             executor: ExecutorSpec::default(),
             seed: 0,
             first_plan: FirstPlan::default(),
-            planner_states: MOST_STATES,
+            planner_states: MAX_STATES,
             improve_states: planner.improve_states,
             planning_budget: Some(Rational::from(PLANNING_BUDGET)),
             self_overlap: planner.settings.self_overlap,
@@ -243,8 +251,8 @@ impl RunSpec {
             objective: Some(Objective::default()),
             running: settings.running,
             planning_time: PlanningTime::Seconds(Rational::ZERO),
-            plans_aside: false,
-            readies_aside: false,
+            plans_in_background: false,
+            prepares_in_background: false,
             realtime: None,
             timeout: settings.timeout,
             max_replans: settings.max_replans,
@@ -262,8 +270,8 @@ impl RunSpec {
             timeout: self.timeout.clone(),
             time_limit: self.time_limit.clone(),
             // A simulation without a clock has no user to warn.
-            plans_aside: self.plans_aside,
-            readies_aside: self.readies_aside,
+            plans_in_background: self.plans_in_background,
+            prepares_in_background: self.prepares_in_background,
             monitors_slack: self.world_process.is_some() || self.realtime.is_some(),
         }
     }

@@ -15,7 +15,7 @@ use super::dispatch::{self, Executor};
 use super::draws::Draws;
 
 /// Maximum number of reported violated requirements.
-const MOST_VIOLATIONS: usize = 3;
+const MAX_VIOLATIONS: usize = 3;
 
 /// Settings of simulated runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -101,7 +101,7 @@ pub(super) fn run(
     broken.sort_by_key(|&(id, runs)| (std::cmp::Reverse(runs), id));
     let broken = broken
         .into_iter()
-        .take(MOST_VIOLATIONS)
+        .take(MAX_VIOLATIONS)
         .map(|(id, runs)| ViolatedRequirement {
             requirement: file.requirement_in_words(id),
             runs,

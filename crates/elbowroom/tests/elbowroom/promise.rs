@@ -44,7 +44,7 @@ const KEEP: [&str; 3] = ["guarded", "live", "stn"];
 /// A limited search, to keep the test fast.
 const SEARCH: Search<'static> = Search {
     most_checks: 60,
-    goes_on: &|| true,
+    may_continue: &|| true,
 };
 
 /// Returns our own plans, and those of the cases.

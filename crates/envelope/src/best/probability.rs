@@ -150,7 +150,7 @@ impl Probability {
         flow: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Outcome {
         let mut is_over = false;
-        let mut goes_on = || {
+        let mut may_continue = || {
             let flow = flow();
             is_over |= flow.is_break();
             flow
@@ -166,7 +166,7 @@ impl Probability {
             ))
         });
         let function: Vec<LogProbability> = softs.collect();
-        let guess = approximate_optimum(&function, master, variables, case, &mut goes_on);
+        let guess = approximate_optimum(&function, master, variables, case, &mut may_continue);
         if is_over {
             return Outcome::Unknown;
         }

@@ -113,12 +113,18 @@ impl Volume {
     ) -> Outcome {
         let CaseContext { chosen, known, .. } = case;
         let mut is_over = false;
-        let mut goes_on = || {
+        let mut may_continue = || {
             let flow = flow();
             is_over |= flow.is_break();
             flow
         };
-        let guess = approximate_optimum(&ScaledVolume(self), master, variables, case, &mut goes_on);
+        let guess = approximate_optimum(
+            &ScaledVolume(self),
+            master,
+            variables,
+            case,
+            &mut may_continue,
+        );
         if is_over {
             return Outcome::Unknown;
         }

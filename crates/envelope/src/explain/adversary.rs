@@ -9,7 +9,7 @@ use elbowroom_stn::{ConsistentNetwork, Constraint, IncrementalWindows, OutOfWind
 use super::Explainer;
 
 /// Maximum number of rounds of a play. Only a network without limits reaches it.
-const MOST_ROUNDS: usize = 10_000;
+const MAX_ROUNDS: usize = 10_000;
 
 /// Policy of an executor without foresight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,7 +50,7 @@ impl Explainer<'_> {
 
     fn play(&self, network: &PlanNetwork, policy: Policy) -> Option<Play> {
         let zero = network_node(NodeId::ZERO);
-        let spoiler = Adversary::new(network.network.clone(), zero);
+        let adversary = Adversary::new(network.network.clone(), zero);
         let mut all = network.network.requirements().clone();
         for link in network.network.links() {
             let (from, to) = (link.activation, link.end);
@@ -64,9 +64,9 @@ impl Explainer<'_> {
         times[0] = Some(Rational::ZERO);
         let mut happened = Vec::new();
         let mut now = Rational::ZERO;
-        for _ in 0..MOST_ROUNDS {
+        for _ in 0..MAX_ROUNDS {
             let mut next: Option<(Rational, NodeId)> = None;
-            let ending = spoiler.ends_now(&now, &times);
+            let ending = adversary.ends_now(&now, &times);
             let mut moved: Vec<NodeId> = ending
                 .iter()
                 .map(|link| NodeId(network.network.link(*link).end.0))
@@ -108,7 +108,7 @@ impl Explainer<'_> {
             if !moved.is_empty() {
                 continue;
             }
-            let look = spoiler.next_query_time(&now, &times);
+            let look = adversary.next_query_time(&now, &times);
             let next = next.map(|(time, _)| time);
             let later = look.into_iter().chain(next).min()?;
             now = later;

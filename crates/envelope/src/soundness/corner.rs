@@ -83,7 +83,7 @@ impl Corner {
         will_do: &dyn Fn(&Valuation) -> bool,
     ) -> Option<Valuation> {
         let mut step = Rational::ONE;
-        for _ in 0..MOST_DOUBLINGS {
+        for _ in 0..MAX_DOUBLINGS {
             let mut reach = step.clone();
             for &(parameter, is_upper) in self.infinite.iter().rev() {
                 valuation[parameter] = if is_upper { reach.clone() } else { -&reach };
@@ -99,7 +99,7 @@ impl Corner {
 }
 
 /// Limit on doublings of values in the search for values that are large enough.
-const MOST_DOUBLINGS: usize = 256;
+const MAX_DOUBLINGS: usize = 256;
 
 /// Returns the factor of a parameter in an expression.
 fn coefficient_of(expression: &Linear, parameter: ParameterId) -> Linear {

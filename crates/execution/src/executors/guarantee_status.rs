@@ -162,7 +162,7 @@ pub(super) fn strongest_guarantee(
 /// Returns the latest end of a running action for which the remaining plan works if nothing else
 /// deviates any more, on the world's clock. `None` if there is none, or no limit. Takes time in
 /// proportion to the plan.
-pub(super) fn bears_until(
+pub(super) fn latest_tolerated_end(
     dispatch: &Dispatch,
     (mission, values): (&PreparedPlan, &Valuation),
     late: InstanceId,

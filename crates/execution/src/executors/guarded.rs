@@ -118,8 +118,10 @@ impl Executor for Guarded {
         self.state.as_ref()?.dispatch.planned(step, is_end)
     }
 
-    fn bears_until(&self, step: StepId, now: &Rational) -> Option<Rational> {
-        self.state.as_ref()?.bears_until(step.instance(), now)
+    fn latest_tolerated_end(&self, step: StepId, now: &Rational) -> Option<Rational> {
+        self.state
+            .as_ref()?
+            .latest_tolerated_end(step.instance(), now)
     }
 
     fn fork(&self) -> Option<Box<dyn Executor>> {
@@ -131,7 +133,7 @@ impl GuardedPlan {
     /// Returns the latest end of a running action, beyond its present window, that does not require
     /// a new plan. It lies within the action's interval if the plan was adopted with its whole
     /// envelope.
-    fn bears_until(&self, instance: InstanceId, now: &Rational) -> Option<Rational> {
+    fn latest_tolerated_end(&self, instance: InstanceId, now: &Rational) -> Option<Rational> {
         let [start, _] = self.dispatch.start_and_end_nodes(instance);
         let begun = self.dispatch.execution_time(start)?;
         let mut durations = duration_parameters(&self.prepared_plan.plan);
@@ -142,7 +144,7 @@ impl GuardedPlan {
             return self.dispatch.latest_tolerable_end(instance, &most, now);
         }
         let plan = (&self.prepared_plan, &self.values);
-        let latest = guarantee_status::bears_until(&self.dispatch, plan, instance, now)?;
+        let latest = guarantee_status::latest_tolerated_end(&self.dispatch, plan, instance, now)?;
         Some(latest.min(self.dispatch.to_world_time(&most)))
     }
 

@@ -182,10 +182,10 @@ impl Executor for Live {
         self.state.as_ref()?.dispatch.planned(step, is_end)
     }
 
-    fn bears_until(&self, step: StepId, now: &Rational) -> Option<Rational> {
+    fn latest_tolerated_end(&self, step: StepId, now: &Rational) -> Option<Rational> {
         let is_guaranteed = self.unguaranteed.is_none();
         let rest = self.state.as_ref().filter(|_| is_guaranteed)?;
-        rest.bears_until(step.instance(), now)
+        rest.latest_tolerated_end(step.instance(), now)
     }
 
     /// The copy does not compare plans.
@@ -292,14 +292,14 @@ impl ExecutedPlan {
     /// Returns the latest end of a running action, beyond its present window, if nothing else
     /// deviates any more. If numbers depend on durations, the result is `None` unless the limit of
     /// this duration was computed.
-    fn bears_until(&self, instance: InstanceId, now: &Rational) -> Option<Rational> {
+    fn latest_tolerated_end(&self, instance: InstanceId, now: &Rational) -> Option<Rational> {
         let limit = if self.durations_move_numbers {
             self.limits.get(&instance)?.as_ref()
         } else {
             None
         };
         let plan = (&*self.prepared_plan, &self.values);
-        let latest = guarantee_status::bears_until(&self.dispatch, plan, instance, now);
+        let latest = guarantee_status::latest_tolerated_end(&self.dispatch, plan, instance, now);
         let limit = limit.and_then(|limit| self.limit_time(instance, limit));
         let limit = limit.map(|limit| self.dispatch.to_world_time(&limit));
         latest.into_iter().chain(limit).min()

@@ -51,12 +51,12 @@ pub(super) const REGISTERED: ExecutorEntry = ExecutorEntry {
             let keeper = (live::REGISTERED.make)(None, means);
             return Box::new(RolloutExecutor::new(rehearsal, keeper));
         }
-        let outlook = means.action_values.clone();
+        let action_values = means.action_values.clone();
         // An executor that evaluates moves does not need to compare plans.
-        let compares = means.comparator.is_some() && outlook.is_none();
+        let compares = means.comparator.is_some() && action_values.is_none();
         let advantage = compares.then(|| Rational::from(5));
         Box::new(Policy {
-            action_values: outlook,
+            action_values,
             plan: (live::REGISTERED.make)(advantage, means),
             is_plan_followed: false,
             probability_loss: 0.0,
@@ -162,10 +162,12 @@ impl Executor for Policy {
                 ..*moment
             })
         });
-        let outlook = self.action_values.clone();
-        let decided = match (kept, outlook) {
+        let action_values = self.action_values.clone();
+        let decided = match (kept, action_values) {
             (Some(kept), None) => kept,
-            (kept, Some(outlook)) => self.decide_by_values(moment, kept, outlook.as_ref()),
+            (kept, Some(action_values)) => {
+                self.decide_by_values(moment, kept, action_values.as_ref())
+            }
             (None, None) => super::without_plan(),
         };
         self.record_commands(&decided, moment.now);
@@ -272,7 +274,7 @@ impl Policy {
         &mut self,
         moment: &DecisionContext<'_>,
         kept: Option<Decided>,
-        outlook: &dyn ActionValues,
+        action_values: &dyn ActionValues,
     ) -> Decided {
         let kept = self.plan_decision(kept);
         // The goal holds, so the remaining steps of the plan are not needed.
@@ -298,43 +300,51 @@ impl Policy {
             };
             return kept.unwrap_or_else(|| wait(None, about));
         }
-        let turn = self.next_evaluation(moment.now, outlook.period());
+        let turn = self.next_evaluation(moment.now, action_values.period());
         let period = match turn {
             NextEvaluation::Now(period) | NextEvaluation::At(period) => period,
         };
-        let Some(weighed) =
-            outlook.evaluate(&self.decision_state(moment.belief, period, outlook, None))
-        else {
+        let Some(weighed) = action_values.evaluate(&self.decision_state(
+            moment.belief,
+            period,
+            action_values,
+            None,
+        )) else {
             return match (kept, turn) {
                 (Some(kept), _) => kept,
                 (None, NextEvaluation::Now(_)) => self.request_new_plan(moment.now),
                 // Until it begins, an event may still help.
                 (None, NextEvaluation::At(period)) => {
-                    let until = period_start(period, outlook.period());
+                    let until = period_start(period, action_values.period());
                     wait(Some(until), Subject::NextEvaluation(0.0))
                 }
             };
         };
         if let Some(kept) = kept {
-            let worth = self.plan_value(&kept, &weighed, moment.belief, period, outlook);
+            let worth = self.plan_value(&kept, &weighed, moment.belief, period, action_values);
             let forgone = (weighed.best() - worth).max(0.0);
             let is_free = matches!(turn, NextEvaluation::At(_)) && !starts;
             if is_free || self.probability_loss + forgone <= MAX_PROBABILITY_LOSS {
                 if !is_free {
                     self.probability_loss += forgone;
                 }
-                return self.limit_wait_to_next_period(kept, moment.now, &turn, outlook.period());
+                return self.limit_wait_to_next_period(
+                    kept,
+                    moment.now,
+                    &turn,
+                    action_values.period(),
+                );
             }
             self.is_plan_followed = false;
             self.abandonment_reason = Some(Reason::new(Cause::Likelier));
         }
         match turn {
             NextEvaluation::At(period) => {
-                let until = period_start(period, outlook.period());
+                let until = period_start(period, action_values.period());
                 wait(Some(until), Subject::NextEvaluation(weighed.best()))
             }
             NextEvaluation::Now(period) => {
-                self.best_decision(moment, period, &weighed, outlook.period())
+                self.best_decision(moment, period, &weighed, action_values.period())
             }
         }
     }

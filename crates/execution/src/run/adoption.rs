@@ -49,7 +49,7 @@ impl Run<'_> {
         let mut steps = mission.running.clone();
         steps.extend(&mission.begun);
         self.action_log.begin_plan(&steps);
-        if self.settings.plans_aside || self.settings.monitors_slack {
+        if self.settings.plans_in_background || self.settings.monitors_slack {
             self.action_log.note_steps(mission);
         }
         self.steps = mission.time_triggered.steps.len();

@@ -28,10 +28,10 @@ use crate::request::Urgency;
 
 impl Run<'_> {
     /// Returns `true` if plans are made in the background from now on.
-    pub(super) fn plans_aside(&self) -> bool {
+    pub(super) fn plans_in_background(&self) -> bool {
         let has_begun = self.now.is_positive() || self.action_log.started() > 0;
         let is_waited_for = !has_begun && !self.goals.is_executive();
-        self.settings.plans_aside && !is_waited_for
+        self.settings.plans_in_background && !is_waited_for
     }
 
     /// Begins a search when a plan is needed and the present one cannot continue.
@@ -46,7 +46,7 @@ impl Run<'_> {
     /// Begins a search because the goals have changed, while the present plan continues. Returns
     /// `false` if the plan cannot continue.
     pub(super) fn search_while_plan_continues(&mut self, reason: &Reason) -> Result<bool, Stop> {
-        let goes_on = self.plans_aside()
+        let may_continue = self.plans_in_background()
             && self.settings.running == RunningRule::Keep
             && !self.search_results.is_plan_infeasible()
             && self.goals.plan().is_some()
@@ -54,7 +54,7 @@ impl Run<'_> {
             && self
                 .goal_status_without_plan()
                 .is_none_or(|it| it == GoalStatus::Unmet);
-        if !goes_on {
+        if !may_continue {
             return Ok(false);
         }
         self.count_replan(reason)?;
@@ -219,10 +219,10 @@ impl Run<'_> {
             return Ok(true);
         }
         let abandoned = self.goals.has_abandoned_goals();
-        let is_to_end = abandoned == Some(true)
+        let must_end = abandoned == Some(true)
             && (self.search_results.ends_searches_at_once()
                 || self.now >= self.search_time_limit(search));
-        if abandoned.is_some() && (is_to_end || self.goals.is_empty()) {
+        if abandoned.is_some() && (must_end || self.goals.is_empty()) {
             self.search_results.count_ended_search();
             self.cancel_search();
             return Ok(false);
@@ -412,7 +412,7 @@ impl Run<'_> {
         guess: OverrunEstimate,
     ) -> Option<AnticipatedSituation> {
         let anticipated = self.background.take_anticipated()?;
-        anticipated.for_request(guess, &self.view(), self.plans_aside())
+        anticipated.for_request(guess, &self.view(), self.plans_in_background())
     }
 
     /// Returns the question for a plan from this situation, now.

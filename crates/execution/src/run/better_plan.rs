@@ -22,7 +22,7 @@ impl Run<'_> {
             return false;
         }
         let reason = Reason::new(Cause::MoreSlack).since(self.now.clone());
-        if self.plans_aside() {
+        if self.plans_in_background() {
             self.search_beside_plan(reason, None);
             return false;
         }
@@ -48,10 +48,10 @@ impl Run<'_> {
     /// continue.
     fn may_seek_better_plan(&self) -> bool {
         let takes_no_time = self.settings.planning_time == PlanningTime::Seconds(Rational::ZERO);
-        let has_planner = if self.plans_aside() {
+        let has_planner = if self.plans_in_background() {
             self.background.search().is_none() && self.background.anticipated().is_none()
         } else {
-            takes_no_time && !self.settings.plans_aside
+            takes_no_time && !self.settings.plans_in_background
         };
         has_planner
             && self.search_results.may_seek_better_plan()

@@ -42,8 +42,8 @@ impl<'a> Closing<'a> {
         }
     }
 
-    pub(super) fn set_stop_check(&mut self, is_to_end: impl Fn() -> bool + Send + 'a) {
-        self.stop_check = Box::new(is_to_end);
+    pub(super) fn set_stop_check(&mut self, must_end: impl Fn() -> bool + Send + 'a) {
+        self.stop_check = Box::new(must_end);
     }
 
     pub(super) fn set_restarts(&mut self, times: usize) {

@@ -190,8 +190,8 @@ impl Run<'_> {
     /// Returns the status of the goal if it holds, or will hold, without further actions.
     pub(super) fn goal_status_without_plan(&self) -> Option<GoalStatus> {
         let is_idle = self.action_log.open_tickets().next().is_none();
-        let outlook = is_idle.then(|| self.belief.goal_status());
-        outlook.filter(|outlook| *outlook != GoalStatus::Unmet)
+        let action_values = is_idle.then(|| self.belief.goal_status());
+        action_values.filter(|action_values| *action_values != GoalStatus::Unmet)
     }
 
     /// Returns the next time at which timed initials may achieve a goal. If all goals must stay

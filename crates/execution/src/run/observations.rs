@@ -84,7 +84,7 @@ impl Run<'_> {
             Event::Feedback { .. }
             | Event::Fact { .. }
             | Event::Value { .. }
-            | Event::Asked(_)
+            | Event::Requested(_)
             | Event::PlanMade
             | Event::PlanReady
             | Event::Unintelligible { .. } => return Planned::default(),
@@ -131,7 +131,7 @@ impl Run<'_> {
                 }
                 None
             }
-            Event::Asked(request) => return self.process_request(request),
+            Event::Requested(request) => return self.process_request(request),
             Event::PlanMade => {
                 let search = self.background.search_mut();
                 let is_new = search.is_some_and(BackgroundSearch::note_finished);

@@ -1,7 +1,7 @@
 //! Executives: runs that continue after their goal is reached, with goals, facts and pauses from
 //! outside.
 //!
-//! Each request arrives as an observation ([`Event::Asked`]). So it is recorded with everything
+//! Each request arrives as an observation ([`Event::Requested`]). So it is recorded with everything
 //! else, and replays and resumed runs receive it again.
 //!
 //! | request or observation | result |
@@ -135,14 +135,14 @@ impl Run<'_> {
             }
             return Ok(());
         }
-        let prepares_aside = self.settings.readies_aside;
+        let prepares_aside = self.settings.prepares_in_background;
         let may_keep = change.are_goals_only_added
             && !(prepares_aside && self.search_results.is_plan_infeasible());
         let plan = self.goals.plan().filter(|_| may_keep);
         let Some(rest) = plan.and_then(|plan| self.view().remaining_plan(plan)) else {
             return self.replan_for_changed_goals(&change);
         };
-        if self.plans_aside() && prepares_aside {
+        if self.plans_in_background() && prepares_aside {
             self.prepare_remaining_plan(change, rest);
             return Ok(());
         }

@@ -94,7 +94,7 @@ impl Run<'_> {
             return Ok(());
         }
         self.stop_if_goal_is_in_doubt()?;
-        if self.plans_aside() {
+        if self.plans_in_background() {
             self.search_from_here(reason);
             return Ok(());
         }
@@ -148,7 +148,7 @@ impl Run<'_> {
         let took = match &self.settings.planning_time {
             PlanningTime::Seconds(seconds) => seconds.clone(),
             // The world's clock starts when there is a first plan.
-            PlanningTime::Measured if self.settings.plans_aside => Rational::ZERO,
+            PlanningTime::Measured if self.settings.plans_in_background => Rational::ZERO,
             PlanningTime::Measured => planned.seconds.unwrap_or_default(),
         };
         self.background.update_expected_time(&took);
@@ -288,7 +288,8 @@ impl Run<'_> {
     /// `true` if it waits.
     pub(super) fn wait_after_refusal(&mut self, reason: &Reason) -> bool {
         let until = self.refusal_backoff.until.clone();
-        if !self.settings.plans_aside || self.now >= until || self.goals.is_change_pending() {
+        if !self.settings.plans_in_background || self.now >= until || self.goals.is_change_pending()
+        {
             return false;
         }
         self.agenda.push(PendingStep::Replan(reason.clone()));

@@ -122,7 +122,7 @@ impl Run<'_> {
         course: PlanStart<'_>,
         fallback: PreparationFallback,
     ) {
-        if self.settings.plans_aside {
+        if self.settings.plans_in_background {
             self.background.set_plan_task(task);
         }
         let request = self.prepare_request(task, course, Urgency::Awaited);

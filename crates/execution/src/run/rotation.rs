@@ -130,7 +130,7 @@ impl Run<'_> {
         Some((since.clone(), is_unsolvable))
     }
 
-    /// Restores the state of another run from a snapshot. To be called after [`Run::lasting`];
+    /// Restores the state of another run from a snapshot. To be called after [`Run::persistent`];
     /// otherwise it has no effect.
     #[must_use]
     pub fn standing(mut self, stand: RunSnapshot) -> Self {

@@ -32,11 +32,11 @@ pub struct RunSettings {
     /// `true` if plans are made in the background ([`Planner::begin`](crate::Planner::begin)),
     /// while the run continues; [`Run`](super::Run) has the rules. The first plan of a run is
     /// awaited, unless the run is an executive.
-    pub plans_aside: bool,
+    pub plans_in_background: bool,
     /// `true` if such plans are also prepared in the background
     /// ([`Preparer::begin`](crate::Preparer::begin)). Then a plan takes over as soon as it is
     /// prepared, and actions that the present plan starts until then are part of it.
-    pub readies_aside: bool,
+    pub prepares_in_background: bool,
     /// The time limit of the run, on the world's clock.
     pub time_limit: Rational,
 }
@@ -51,8 +51,8 @@ impl Default for RunSettings {
             max_replans: 10,
             timeout: TimeoutRule::default(),
             monitors_slack: false,
-            plans_aside: false,
-            readies_aside: false,
+            plans_in_background: false,
+            prepares_in_background: false,
             time_limit: Rational::from(1_000_000),
         }
     }

@@ -119,7 +119,10 @@ impl Run<'_> {
         if late.is_tolerance_computed {
             return Some(late);
         }
-        let later = self.ports.executor.bears_until(late.step, &self.now);
+        let later = self
+            .ports
+            .executor
+            .latest_tolerated_end(late.step, &self.now);
         let until = later
             .into_iter()
             .fold(late.window_end.clone(), Rational::max);

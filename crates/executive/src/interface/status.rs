@@ -585,8 +585,8 @@ impl StatusData {
                 }
             }
             // Rejected requests have no effect.
-            Event::Asked(request) if !is_remarkable => self.on_request(request),
-            Event::Asked(_)
+            Event::Requested(request) if !is_remarkable => self.on_request(request),
+            Event::Requested(_)
             | Event::Fact { .. }
             | Event::Value { .. }
             | Event::PlanMade

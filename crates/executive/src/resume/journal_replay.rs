@@ -22,7 +22,7 @@ pub(super) struct JournalReplay {
     played: AtomicUsize,
     /// First line that deviates; 0 if there is none.
     difference: AtomicUsize,
-    is_to_end: AtomicBool,
+    must_end: AtomicBool,
 }
 
 impl JournalReplay {
@@ -32,7 +32,7 @@ impl JournalReplay {
             first: stored.first_number(),
             played: AtomicUsize::new(0),
             difference: AtomicUsize::new(0),
-            is_to_end: AtomicBool::new(false),
+            must_end: AtomicBool::new(false),
         };
         replay.look_ahead(0);
         replay
@@ -40,8 +40,8 @@ impl JournalReplay {
 
     /// Ends the run where its journal contains an interruption.
     fn look_ahead(&self, next: usize) {
-        let is_to_end = matches!(self.lines.get(next), Some(Line::Interrupted(_)));
-        self.is_to_end.store(is_to_end, Ordering::SeqCst);
+        let must_end = matches!(self.lines.get(next), Some(Line::Interrupted(_)));
+        self.must_end.store(must_end, Ordering::SeqCst);
     }
 
     /// Compares an entry with the journal. Returns `true` for a new entry after its end.
@@ -210,9 +210,9 @@ impl Observer for ReplayWatcher<'_> {
     }
 
     fn flow(&mut self) -> ControlFlow<StopRequest> {
-        let is_to_end = self.replay.is_to_end.load(Ordering::SeqCst) || self.health.has_failed();
+        let must_end = self.replay.must_end.load(Ordering::SeqCst) || self.health.has_failed();
         match () {
-            () if is_to_end => ControlFlow::Break(StopRequest::Cancelled),
+            () if must_end => ControlFlow::Break(StopRequest::Cancelled),
             () if self.replay.is_over() => self.inner.flow(),
             () => ControlFlow::Continue(()),
         }

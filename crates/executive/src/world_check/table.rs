@@ -131,7 +131,7 @@ pub(super) struct Findings {
 }
 
 /// Maximum number of examples kept of each violation.
-const MOST_EXAMPLES: usize = 3;
+const MAX_EXAMPLES: usize = 3;
 
 impl Findings {
     /// Marks the check as done.
@@ -154,7 +154,7 @@ impl Findings {
         let why = why.into();
         let known = self.violations.iter().filter(|(other, _)| *other == check);
         let known: Vec<_> = known.map(|(_, known)| known).collect();
-        if known.len() < MOST_EXAMPLES && !known.contains(&&why) {
+        if known.len() < MAX_EXAMPLES && !known.contains(&&why) {
             self.violations.push((check, why));
         }
     }

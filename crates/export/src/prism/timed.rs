@@ -34,7 +34,7 @@ pub enum Bound {
 ///
 /// # Errors
 /// When the world has no timed optimum, when the number of cells is out of range, and when there
-/// are more than [`MOST_COMMANDS`](super::MOST_COMMANDS) commands.
+/// are more than [`MAX_COMMANDS`](super::MAX_COMMANDS) commands.
 pub fn timed(
     task: &Task,
     model: &WorldModel,

@@ -16,7 +16,7 @@ use super::{PrismError, bare, checked, dead_ends};
 use crate::names::distinct;
 
 /// Maximum number of states in the search for dead ends.
-const MOST_STATES: usize = 1 << 18;
+const MAX_STATES: usize = 1 << 18;
 
 /// Returns the Markov decision process of [`optimum`](elbowroom_probability::optimum) in the
 /// language of PRISM. Its `Pmax=? [F "goal"]` is the best probability of reaching the goal.
@@ -157,7 +157,7 @@ impl<'p> Process<'p> {
                 .map(|set| set.iter().chain([action]).copied().collect())
                 .collect();
             sets.extend(longer);
-            if sets.len() > MOST_STATES >> self.facts.len().min(60) {
+            if sets.len() > MAX_STATES >> self.facts.len().min(60) {
                 return Err(too_many().into());
             }
         }
@@ -422,8 +422,8 @@ impl<'p> Process<'p> {
                 let name = &self.names[action];
                 let body = self.actions[action].1.durative();
                 let over_all = body.map_or(Formula::TRUE, |body| self.condition(&body.over_all));
-                let goes_on = Formula::all([Formula::atom(format!("u_{name}")), over_all]);
-                format!("&(u_{name}'=({goes_on}))")
+                let may_continue = Formula::all([Formula::atom(format!("u_{name}")), over_all]);
+                format!("&(u_{name}'=({may_continue}))")
             });
             let kept: String = kept.collect();
             let after = phases.count.unwrap_or(0);

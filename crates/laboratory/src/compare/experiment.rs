@@ -4,7 +4,7 @@ mod file;
 
 use elbowroom::answers::envelope::objective_of;
 use elbowroom::envelope::Objective;
-use elbowroom::execute::{FirstPlan, MOST_STATES, PLANNING_BUDGET};
+use elbowroom::execute::{FirstPlan, MAX_STATES, PLANNING_BUDGET};
 use elbowroom::mdp::Settings;
 use elbowroom_execution::executors::ExecutorSpec;
 use elbowroom_execution::run::{RunSettings, TimeoutRule};
@@ -158,8 +158,8 @@ impl Experiment {
             timeout,
             // Worlds of experiments have no clock.
             monitors_slack: _,
-            plans_aside: _,
-            readies_aside: _,
+            plans_in_background: _,
+            prepares_in_background: _,
             time_limit,
         } = settings;
         let texts = |texts: &mut dyn Iterator<Item = String>| texts.collect::<Vec<_>>();
@@ -318,7 +318,7 @@ impl Experiment {
             plan: read.plan.as_ref().map(named).transpose()?,
             first_plan,
             planner,
-            planner_states: read.planner_states.unwrap_or(MOST_STATES),
+            planner_states: read.planner_states.unwrap_or(MAX_STATES),
             improve_states: read.improve_states.unwrap_or(20_000),
             planning_budget,
             table_states: Settings::default().most_states,

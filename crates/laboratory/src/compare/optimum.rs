@@ -37,7 +37,7 @@ pub(super) fn of(
     experiment: &Experiment,
     fillings: &[Vec<(String, String)>],
     part: Part,
-    goes_on: &(dyn Fn() -> bool + Sync),
+    may_continue: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<ColumnOptimum>, ExperimentError> {
     let is_of_part = |(problem, _): &(usize, &Vec<(String, String)>)| {
         *problem as u64 % part.shards.max(1) == part.shard
@@ -52,7 +52,12 @@ pub(super) fn of(
                 .enumerate()
                 .filter(is_of_part)
                 .map(|(problem, filling)| {
-                    bounds(experiment, column, (problem, filling, threads), goes_on)
+                    bounds(
+                        experiment,
+                        column,
+                        (problem, filling, threads),
+                        may_continue,
+                    )
                 })
                 .collect();
             Ok(mean(&bounds?))
@@ -64,7 +69,7 @@ fn bounds(
     experiment: &Experiment,
     column: &Column,
     (problem, filling, threads): (usize, &[(String, String)], usize),
-    goes_on: &(dyn Fn() -> bool + Sync),
+    may_continue: &(dyn Fn() -> bool + Sync),
 ) -> Result<Result<(f64, f64), String>, ExperimentError> {
     let setting = Setting {
         experiment,
@@ -75,13 +80,13 @@ fn bounds(
         threads,
     };
     let (task, world) = setting.problem_and_world(column)?;
-    let sets = ActionSets::new(&task, &world, setting.embedded(), goes_on);
+    let sets = ActionSets::new(&task, &world, setting.embedded(), may_continue);
     let settings = Settings {
         plans: sets.plans,
         fallbacks: sets.fallbacks,
         ..Settings::default()
     };
-    let found = optimum(&task, &world, &settings, goes_on);
+    let found = optimum(&task, &world, &settings, may_continue);
     Ok(found
         .map(|found| (found.lower, found.upper))
         .map_err(|why| why.to_string()))

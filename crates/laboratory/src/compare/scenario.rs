@@ -26,7 +26,7 @@ pub(super) struct Scenario {
     /// The world of the runs.
     pub(super) world: WorldModel,
     pub(super) likelihoods: Arc<Likelihoods>,
-    pub(super) foresight: PolicyTableCache,
+    pub(super) policy_tables: PolicyTableCache,
     pub(super) preparer: CachingPreparer<PlanPreparer>,
     /// Search for likelier plans, for executors that use it, and the same with a cache.
     pub(super) plan_comparator: SharedMostProbablePlanner,
@@ -48,7 +48,7 @@ impl Setting<'_> {
         place: usize,
         task: &Arc<Task>,
         first: &TimeTriggeredPlan,
-        goes_on: &(dyn Fn() -> bool + Sync),
+        may_continue: &(dyn Fn() -> bool + Sync),
     ) -> Result<Scenario, ExperimentError> {
         let column = &self.experiment.columns[place];
         let happens = world(column, task)?;
@@ -76,7 +76,7 @@ impl Setting<'_> {
         let mut executors = self.experiment.executors.iter();
         let needs_action_values = executors.clone().any(|spec| spec.needs().action_values);
         let needs_rollouts = executors.any(|spec| spec.needs().rollouts);
-        let outlook = needs_action_values.then(|| {
+        let action_values = needs_action_values.then(|| {
             let most_states = self.experiment.table_states;
             let has_plans = self.experiment.planner == Planning::Embedded && most_states > 0;
             let settings = Settings {
@@ -84,10 +84,10 @@ impl Setting<'_> {
                 ..Settings::default()
             };
             let planner = has_plans.then(|| self.embedded());
-            action_values(task, &world, planner, settings, goes_on).ok()
+            action_values(task, &world, planner, settings, may_continue).ok()
         });
-        let outlook = outlook.flatten();
-        let rehearse = (needs_rollouts && outlook.is_none()).then(|| {
+        let action_values = action_values.flatten();
+        let rehearse = (needs_rollouts && action_values.is_none()).then(|| {
             // The executor that uses rollouts is not simulated in them.
             let rollouts = self.rollouts(&ExecutorSpec::default(), column, (&world, &likelihoods));
             SharedRolloutPolicy::new(RolloutPolicy::new(rollouts, self.embedded()))
@@ -103,7 +103,7 @@ impl Setting<'_> {
             let is_given = self.experiment.plan.is_some();
             let chooses = !is_given && (tries_out || !self.experiment.first_plan.is_shortest());
             let known = (&**task, &world, &likelihoods);
-            let chosen = chooses.then(|| self.chosen_plan(spec, column, known, goes_on));
+            let chosen = chooses.then(|| self.chosen_plan(spec, column, known, may_continue));
             let chosen = chosen.flatten();
             let likely = (!is_given && chosen.is_none() && spec.needs().action_values).then(|| {
                 let answer = likeliest.plan(task, &Situation::initial(task)).answer;
@@ -119,13 +119,13 @@ impl Setting<'_> {
             firsts.push(plan.unwrap_or_else(|| first.clone()));
         }
         Ok(Scenario {
-            action_values: outlook,
+            action_values,
             rollouts: rehearse,
             first_plans: firsts,
             first_plan_notes: beginnings,
             world: happens,
             likelihoods,
-            foresight: PolicyTableCache::default(),
+            policy_tables: PolicyTableCache::default(),
             preparer,
             comparing_planner: likeliest,
             plan_comparator: odds,
@@ -139,7 +139,7 @@ impl Setting<'_> {
         spec: &ExecutorSpec,
         column: &Column,
         (task, world, likelihoods): (&Task, &WorldModel, &Arc<Likelihoods>),
-        goes_on: &(dyn Fn() -> bool + Sync),
+        may_continue: &(dyn Fn() -> bool + Sync),
     ) -> Option<Choice> {
         let experiment = self.experiment;
         if experiment.planner != Planning::Embedded {
@@ -152,7 +152,7 @@ impl Setting<'_> {
             work: embedded.work,
             knowledge: WorldKnowledge::World(self.rollouts(spec, column, (world, likelihoods))),
             settings: embedded.settings,
-            may_continue: goes_on,
+            may_continue,
         };
         chooser.choose(task, &Situation::initial(task)).ok()
     }

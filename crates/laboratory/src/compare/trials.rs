@@ -53,23 +53,23 @@ struct SharedSetup<'a> {
 }
 
 impl Setting<'_> {
-    /// Runs the trials of a part. `tell` is called after each, and returns `false` to stop;
-    /// `goes_on` is polled in between.
+    /// Runs the trials of a part. `on_trial` is called after each, and returns `false` to stop;
+    /// `may_continue` is polled in between.
     pub(super) fn run(
         &self,
         part: Part,
         records: Option<&TrialRecords>,
-        tell: &(dyn Fn() -> bool + Sync),
-        goes_on: &(dyn Fn() -> bool + Sync),
+        on_trial: &(dyn Fn() -> bool + Sync),
+        may_continue: &(dyn Fn() -> bool + Sync),
     ) -> Result<Results, ExperimentError> {
         let experiment = self.experiment;
         let mut results = Results::empty(experiment, part);
-        if !goes_on() {
+        if !may_continue() {
             return Ok(results);
         }
-        let mut common = self.common(goes_on)?;
+        let mut common = self.common(may_continue)?;
         // After an interruption, a table or a chosen plan may be missing.
-        if !goes_on() {
+        if !may_continue() {
             return Ok(results);
         }
         for place in &common.columns {
@@ -77,8 +77,14 @@ impl Setting<'_> {
         }
         for trial in part.numbers().skip(self.piece).step_by(self.pieces) {
             for column in 0..experiment.columns.len() {
-                self.trial((trial, column), records, &mut common, &mut results, goes_on);
-                if !tell() {
+                self.trial(
+                    (trial, column),
+                    records,
+                    &mut common,
+                    &mut results,
+                    may_continue,
+                );
+                if !on_trial() {
                     return Ok(results);
                 }
             }
@@ -89,7 +95,7 @@ impl Setting<'_> {
     /// Reads the problem, computes the first plan, and prepares it for all executors.
     fn common<'a>(
         &self,
-        goes_on: &'a (dyn Fn() -> bool + Sync),
+        may_continue: &'a (dyn Fn() -> bool + Sync),
     ) -> Result<SharedSetup<'a>, ExperimentError> {
         let (domain, problem) = self.texts()?;
         let task = Self::task(&domain, &problem)?;
@@ -97,7 +103,7 @@ impl Setting<'_> {
         if let Some(feature) = task.validator_only_feature() {
             return Err(self.error(&SpecError::UnsupportedFeature(feature).to_string()));
         }
-        let mut planner = self.planner(domain, problem, goes_on)?;
+        let mut planner = self.planner(domain, problem, may_continue)?;
         let first = match &self.experiment.plan {
             Some(text) => self.read_given_plan(&task, text)?,
             None => match planner.plan(&task, &Situation::initial(&task)).answer {
@@ -110,7 +116,8 @@ impl Setting<'_> {
         };
         let task = Arc::new(task);
         let columns = 0..self.experiment.columns.len();
-        let columns = columns.map(|column| self.prepare_scenario(column, &task, &first, goes_on));
+        let columns =
+            columns.map(|column| self.prepare_scenario(column, &task, &first, may_continue));
         Ok(SharedSetup {
             columns: columns.collect::<Result<_, _>>()?,
             planner: CachingPlanner::new(planner, PLAN_CACHE_SIZE),
@@ -142,7 +149,7 @@ impl Setting<'_> {
         records: Option<&TrialRecords>,
         common: &mut SharedSetup<'_>,
         results: &mut Results,
-        goes_on: &(dyn Fn() -> bool + Sync),
+        may_continue: &(dyn Fn() -> bool + Sync),
     ) {
         let seed = self.seed(trial);
         let executors = &self.experiment.executors;
@@ -152,7 +159,7 @@ impl Setting<'_> {
             // threads.
             let task = Arc::new(common.task.with_own_table());
             reports.push(self.execute(&task, seed, (row, spec), column, common, None));
-            if !goes_on() {
+            if !may_continue() {
                 return;
             }
         }
@@ -315,11 +322,11 @@ impl Setting<'_> {
         let Scenario {
             world,
             likelihoods,
-            foresight,
+            policy_tables,
             preparer,
             plan_comparator: odds,
             comparing_planner: likeliest,
-            action_values: outlook,
+            action_values,
             rollouts: rehearse,
             first_plans: firsts,
             first_plan_notes: _,
@@ -334,9 +341,9 @@ impl Setting<'_> {
             .by(spec.clone())
             .with_settings(settings.clone())
             .with_likelihoods(Arc::clone(likelihoods))
-            .with_foresight(foresight.clone())
+            .with_policy_tables(policy_tables.clone())
             .with_plan_comparator(Some(Box::new(odds.clone())))
-            .with_action_values(outlook.clone())
+            .with_action_values(action_values.clone())
             .with_rollouts(rehearse.clone())
             .with_planner(planner)
             .with_preparer(preparer);
@@ -357,15 +364,15 @@ impl Setting<'_> {
         &self,
         domain: Source,
         problem: Source,
-        goes_on: &'a (dyn Fn() -> bool + Sync),
+        may_continue: &'a (dyn Fn() -> bool + Sync),
     ) -> Result<Box<dyn Planner + 'a>, ExperimentError> {
         match &self.experiment.planner {
             Planning::Embedded => Ok(Box::new(Embedded {
-                may_continue: Some(goes_on),
+                may_continue: Some(may_continue),
                 ..self.embedded()
             })),
             Planning::External { name, seconds } => {
-                external_planner(name, seconds.as_ref(), domain, problem, goes_on)
+                external_planner(name, seconds.as_ref(), domain, problem, may_continue)
             }
         }
     }
@@ -470,7 +477,7 @@ fn external_planner<'a>(
     seconds: Option<&Rational>,
     domain: Source,
     problem: Source,
-    goes_on: &'a (dyn Fn() -> bool + Sync),
+    may_continue: &'a (dyn Fn() -> bool + Sync),
 ) -> Result<Box<dyn Planner + 'a>, ExperimentError> {
     let planner = external::Planner::named(name);
     let seconds = seconds.map(|seconds| Duration::from_secs_f64(seconds.to_f64().min(1e9)));
@@ -483,6 +490,6 @@ fn external_planner<'a>(
             ..external::Settings::default()
         },
         stops_at_first_plan: seconds.is_none(),
-        may_continue: goes_on,
+        may_continue,
     }))
 }

@@ -18,7 +18,7 @@ pub(super) struct EmbeddedPlans {
 }
 
 /// Maximum number of states in a search. A larger search counts as finding no plan.
-const MOST_STATES: u64 = 100_000;
+const MAX_STATES: u64 = 100_000;
 
 impl EmbeddedPlans {
     pub(super) fn new(task: Arc<Task>) -> Self {
@@ -35,7 +35,7 @@ impl EmbeddedPlans {
         }
         let mut planner = Embedded {
             settings: embedded::Settings::default(),
-            most_states: MOST_STATES,
+            most_states: MAX_STATES,
             improve_states: 0,
             // A proof that no plan exists makes no difference to a trial.
             certificate_work: 0,

@@ -225,8 +225,8 @@ fn missing_first_plan_names_the_limit_as_the_file_does() {
 #[test]
 fn interrupted_trial_does_not_count() {
     let experiment = experiment();
-    let successes = |part, goes_on: &(dyn Fn(u64) -> bool + Sync)| {
-        let results = run(&experiment, part, goes_on).expect("a correct test");
+    let successes = |part, may_continue: &(dyn Fn(u64) -> bool + Sync)| {
+        let results = run(&experiment, part, may_continue).expect("a correct test");
         let cells = results.cells.into_iter().flatten();
         let counts: Vec<_> = cells.map(|cell| (cell.runs, cell.successes)).collect();
         (counts, results.is_interrupted)

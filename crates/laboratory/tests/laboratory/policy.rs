@@ -190,13 +190,13 @@ fn made_of(small: &Small<'_>, runs: u64) -> Option<PolicyResults> {
     let policy = Policy::new(&task, &model, &settings, &|| true);
     let policy = policy.expect("all of it is known to the process")?;
     let (lower, upper) = (policy.optimum().lower, policy.optimum().upper);
-    let outlook: Arc<dyn ActionValues> = Arc::new(policy);
+    let action_values: Arc<dyn ActionValues> = Arc::new(policy);
     let runs_of = |executor: &str| -> Vec<Report> {
         let runs = (0..runs).map(|seed| {
             let execution = Execution::of(&task)
                 .by(executor.parse().expect("it is registered"))
                 .beginning_with(plan.clone())
-                .with_action_values(Some(Arc::clone(&outlook)));
+                .with_action_values(Some(Arc::clone(&action_values)));
             execution.run_in(&mut *model.world(&task, seed))
         });
         runs.collect()
@@ -425,14 +425,14 @@ fn nearly_certain_plan_uses_table_of_its_actions() {
         optimum.within.is_some() && optimum.lower > 0.99,
         "{optimum:?}"
     );
-    let outlook: Arc<dyn ActionValues> = Arc::new(policy);
+    let action_values: Arc<dyn ActionValues> = Arc::new(policy);
     let text = "0: (rush) [1]\n1.001: (deliver) [1]\n";
     let first = read_plan(&source(text), &task).expect("it is a plan").0;
     for seed in 0..50 {
         let execution = Execution::of(&task)
             .by("policy".parse().expect("it is registered"))
             .beginning_with(first.clone())
-            .with_action_values(Some(Arc::clone(&outlook)));
+            .with_action_values(Some(Arc::clone(&action_values)));
         let report = execution.run_in(&mut *model.world(&task, seed));
         assert_eq!(report.verdict, Verdict::GoalReached, "{seed}: {report:#?}");
         // The planner was not called.

@@ -66,12 +66,12 @@ struct Search<'a> {
 }
 
 /// Computes bounds from both sides if everything happens at known times; `None` if not, or if
-/// `goes_on` returns `false`.
+/// `may_continue` returns `false`.
 pub(crate) fn bounds(
     world: &TimedWorld,
     settings: &Settings,
     effort: Effort,
-    goes_on: &dyn Fn() -> bool,
+    may_continue: &dyn Fn() -> bool,
 ) -> Result<Option<FoundBounds>, NotTabulated> {
     let Some(cells) = cells(world) else {
         return Ok(None);
@@ -84,7 +84,7 @@ pub(crate) fn bounds(
     };
     let mut search = Search {
         settings,
-        may_continue: goes_on,
+        may_continue,
         found: FoundBounds {
             grid,
             cells,

@@ -7,7 +7,7 @@ use super::compile::Compiler;
 use crate::settings::NotTabulated;
 
 /// Maximum number of outcomes of an action's failures.
-const MOST_WAYS: usize = 64;
+const MAX_WAYS: usize = 64;
 
 impl Compiler<'_> {
     /// Returns the distinct outcomes of an action's failures.
@@ -46,9 +46,9 @@ impl Compiler<'_> {
         if rest > 1e-9 {
             add(&mut ways, rest, undone.unwrap_or_default(), 0.0);
         }
-        if ways.len() > MOST_WAYS {
+        if ways.len() > MAX_WAYS {
             return refuse(&format!(
-                "{} different outcomes of its failures, more than the limit of {MOST_WAYS}",
+                "{} different outcomes of its failures, more than the limit of {MAX_WAYS}",
                 ways.len()
             ));
         }

@@ -13,10 +13,10 @@ use super::world::{TimedWorld, unknown_shape};
 use crate::settings::{NotTabulated, Side};
 
 /// Maximum number of cuts of a number, or of a random amount.
-const MOST_CUTS: usize = 64;
+const MAX_CUTS: usize = 64;
 
 /// Maximum number of constant amounts that are added up to find cuts.
-const MOST_SUMMED: usize = 8;
+const MAX_SUMMED: usize = 8;
 
 impl Amount {
     /// Returns the cut of the amount that separates changes (or assigned values) of at most `way`
@@ -175,7 +175,7 @@ impl TimedWorld {
         let mut all = vec![0];
         let mut seen = BTreeSet::from([0]);
         let mut last = vec![0];
-        for _ in 0..MOST_SUMMED {
+        for _ in 0..MAX_SUMMED {
             let mut next = Vec::new();
             for sum in &last {
                 for step in &steps {
@@ -218,19 +218,19 @@ impl TimedWorld {
         for sum in sums {
             for edge in self.thresholds(place) {
                 let is_beyond = only_falls && highest.is_some_and(|highest| edge - sum > highest);
-                if edges.len() < MOST_CUTS && !is_beyond {
+                if edges.len() < MAX_CUTS && !is_beyond {
                     edges.insert(edge - sum);
                 }
             }
             for anchor in &anchors {
-                if known.len() < MOST_CUTS {
+                if known.len() < MAX_CUTS {
                     known.insert(anchor + sum);
                 }
             }
         }
         let drawn = self.amounts_of(place).filter(|amount| amount.is_drawn());
         for (anchor, half) in drawn.flat_map(|amount| self.halves(amount)) {
-            if edges.len() < MOST_CUTS {
+            if edges.len() < MAX_CUTS {
                 edges.insert(anchor + half);
             }
         }
@@ -342,7 +342,7 @@ impl TimedWorld {
         let mut cuts = BTreeSet::new();
         for way in ways.chain(halves) {
             let cut = amount.cut(way);
-            if cuts.len() < MOST_CUTS && self.may_be_beyond(amount, cut) {
+            if cuts.len() < MAX_CUTS && self.may_be_beyond(amount, cut) {
                 cuts.insert(cut);
             }
         }

@@ -42,11 +42,11 @@ pub struct TimedWorld {
 }
 
 /// Maximum number of actions and events, which are bits.
-const MOST_ACTS: usize = 64;
-const MOST_EVENTS: usize = 32;
+const MAX_ACTS: usize = 64;
+const MAX_EVENTS: usize = 32;
 
 /// Maximum number of facts and comparisons of numbers together.
-const MOST_FACTS: usize = 128;
+const MAX_FACTS: usize = 128;
 
 impl TimedWorld {
     /// Compiles the task and the world.
@@ -74,9 +74,9 @@ impl TimedWorld {
         let goal = task.goal().clone();
         let compiler = Compiler::new(task, model, &actions, &goal)?;
         let events = compiler.events(model)?;
-        if events.len() > MOST_EVENTS {
+        if events.len() > MAX_EVENTS {
             return Err(NotTabulated::new(format!(
-                "{} events are relevant, more than the limit of {MOST_EVENTS}",
+                "{} events are relevant, more than the limit of {MAX_EVENTS}",
                 events.len()
             )));
         }
@@ -84,9 +84,9 @@ impl TimedWorld {
         for action in &actions {
             acts.extend(compiler.act(action, model)?);
         }
-        if acts.len() > MOST_ACTS {
+        if acts.len() > MAX_ACTS {
             return Err(NotTabulated::new(format!(
-                "{} actions are relevant, more than the limit of {MOST_ACTS}",
+                "{} actions are relevant, more than the limit of {MAX_ACTS}",
                 acts.len()
             )));
         }
@@ -95,9 +95,9 @@ impl TimedWorld {
         let initial = initial.fold(0, |facts, fact| facts | compiler.bit(*fact));
         let tests = compiler.tests.into_inner();
         let known = compiler.facts.len() + tests.len();
-        if known > MOST_FACTS {
+        if known > MAX_FACTS {
             return Err(NotTabulated::new(format!(
-                "{known} facts and comparisons are relevant, more than the limit of {MOST_FACTS}"
+                "{known} facts and comparisons are relevant, more than the limit of {MAX_FACTS}"
             )));
         }
         let mut world = Self {

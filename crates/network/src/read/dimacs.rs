@@ -12,7 +12,7 @@ use crate::number::Bound;
 use crate::report::Report;
 
 /// Limit on nodes: more than any such file has.
-const MOST_NODES: usize = 1 << 20;
+const MAX_NODES: usize = 1 << 20;
 
 /// Returns `true` if a line belongs to this format.
 pub(super) fn is_line(line: &str) -> bool {
@@ -92,7 +92,7 @@ fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
 fn node_count(text: &str, report: &mut Report) -> Option<usize> {
     for (at, line) in lines(text) {
         if let ["p", _, count, ..] = words(line)[..] {
-            let count = count.parse().ok().filter(|&count| count <= MOST_NODES);
+            let count = count.parse().ok().filter(|&count| count <= MAX_NODES);
             if count.is_none() {
                 report.mistake(
                     at,

@@ -6,7 +6,7 @@ use elbowroom_model::problem::{
 
 use crate::lower::Reader;
 use crate::lower::sections::Section;
-use crate::lower::typed_list::{MOST_VARIABLES, Typed};
+use crate::lower::typed_list::{MAX_VARIABLES, Typed};
 use crate::source::Span;
 use crate::syntax::Node;
 
@@ -161,10 +161,10 @@ impl Reader {
     pub(super) fn unknowns(&mut self, nodes: &[Node]) -> Vec<String> {
         let mut names: Vec<String> = Vec::new();
         for entry in self.typed_list(nodes) {
-            if names.len() == MOST_VARIABLES {
+            if names.len() == MAX_VARIABLES {
                 self.report.error(
                     entry.node.span,
-                    format!("more than {MOST_VARIABLES} unknowns in one list"),
+                    format!("more than {MAX_VARIABLES} unknowns in one list"),
                 );
                 break;
             }

@@ -12,7 +12,7 @@ use crate::lower::Reader;
 use crate::source::Span;
 
 /// Maximum number of parts of one condition, or of the effects of one action, after expansion.
-const MOST_PARTS: u64 = 10_000_000;
+const MAX_PARTS: u64 = 10_000_000;
 
 /// Counter of the parts after expansion.
 struct Sizes<'a> {
@@ -32,7 +32,7 @@ impl Reader {
         };
         let mut too_large: Vec<(Span, String)> = Vec::new();
         let mut check = |size: u64, span: Span, what: String| {
-            if size > MOST_PARTS {
+            if size > MAX_PARTS {
                 too_large.push((span, what));
             }
         };
@@ -96,7 +96,7 @@ impl Reader {
         }
         for (span, what) in too_large {
             self.report
-                .error(span, format!("{what} has more than {MOST_PARTS} parts"))
+                .error(span, format!("{what} has more than {MAX_PARTS} parts"))
                 .label("when its quantifiers are expanded")
                 .advise("use fewer nested quantifiers, or narrower types");
         }

@@ -10,7 +10,7 @@ use crate::source::Span;
 
 /// Maximum number of paths from one type to `object`, since computing the supertypes may walk them
 /// all.
-const MOST_PATHS: u64 = 1000;
+const MAX_PATHS: u64 = 1000;
 /// In larger hierarchies, [`Reader::can_fit`] does not search for common subtypes.
 const MAX_COMPARED: usize = 1000;
 /// Maximum length of a path to `object`.
@@ -133,14 +133,14 @@ impl Reader {
                         format!("`{}` is in a cycle of subtypes, or below one", ty.name),
                     )
                     .advise("remove the cycle");
-            } else if paths[index] > MOST_PATHS || height[index] > HIGHEST {
+            } else if paths[index] > MAX_PATHS || height[index] > HIGHEST {
                 self.report
                     .error(
                         place(&ty.name),
                         format!("`{}` is too deep in the type hierarchy", ty.name),
                     )
                     .advise(format!(
-                        "at most {HIGHEST} levels, and {MOST_PATHS} paths to supertypes"
+                        "at most {HIGHEST} levels, and {MAX_PATHS} paths to supertypes"
                     ));
             } else {
                 continue;

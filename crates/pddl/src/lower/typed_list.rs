@@ -16,7 +16,7 @@ const LONGEST_EITHER: usize = 100;
 pub(super) type TypeNames = Rc<[(String, Span)]>;
 
 /// Maximum number of variables in one list, since their lookup takes linear time.
-pub(super) const MOST_VARIABLES: usize = 1000;
+pub(super) const MAX_VARIABLES: usize = 1000;
 
 /// An entry of a typed list.
 #[derive(Debug)]
@@ -122,10 +122,10 @@ impl Reader {
     pub(super) fn variables(&mut self, nodes: &[Node]) -> Vec<Variable> {
         let mut variables: Vec<Variable> = Vec::new();
         for entry in self.typed_list(nodes) {
-            if variables.len() == MOST_VARIABLES {
+            if variables.len() == MAX_VARIABLES {
                 self.report.error(
                     entry.node.span,
-                    format!("more than {MOST_VARIABLES} variables in one list"),
+                    format!("more than {MAX_VARIABLES} variables in one list"),
                 );
                 break;
             }

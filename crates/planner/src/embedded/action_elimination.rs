@@ -13,14 +13,14 @@ use elbowroom_num::Rational;
 /// Only steps that supply no fact to another step are tried: there are few of them, and the
 /// validator decides whether the plan is valid without them. Steps that change numbers which
 /// something reads are usually needed. Trials of each kind stop after a few failures
-/// ([`MAX_FAILED_TRIALS`]). `goes_on` is called before each trial; when it returns `false`, the
+/// ([`MAX_FAILED_TRIALS`]). `may_continue` is called before each trial; when it returns `false`, the
 /// remaining steps stay.
 pub(super) fn without_redundant_actions(
     task: &Task,
     situation: &Situation,
     plan: TimeTriggeredPlan,
     report: Report,
-    goes_on: &mut dyn FnMut() -> bool,
+    may_continue: &mut dyn FnMut() -> bool,
 ) -> (TimeTriggeredPlan, Report) {
     let mut timeline = Timeline::new(task, situation, &plan.steps);
     let mut left = (plan, report);
@@ -35,7 +35,7 @@ pub(super) fn without_redundant_actions(
         if *in_vain >= MAX_FAILED_TRIALS {
             continue;
         }
-        if !goes_on() {
+        if !may_continue() {
             break;
         }
         let mut fewer = left.0.clone();

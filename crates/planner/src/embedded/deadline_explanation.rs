@@ -94,11 +94,11 @@ pub(crate) fn relaxed_proof(names: &Names, compiled: &Compiled) -> Option<Proof>
 }
 
 /// Returns a proof that no plan exists, if two parts of the goal cannot hold together in time. The
-/// search for the responsible deadlines stops when `goes_on` returns `false`.
+/// search for the responsible deadlines stops when `may_continue` returns `false`.
 pub(crate) fn pairs_proof(
     names: &Names,
     compiled: &Compiled,
-    goes_on: &mut dyn FnMut() -> bool,
+    may_continue: &mut dyn FnMut() -> bool,
 ) -> Option<Proof> {
     let initial = root(compiled);
     let mut pairs = H2::of(compiled)?;
@@ -116,7 +116,7 @@ pub(crate) fn pairs_proof(
         .collect();
     let mut is_stopped = false;
     let mut fails_without = |ignored: &[usize]| {
-        is_stopped = is_stopped || !goes_on();
+        is_stopped = is_stopped || !may_continue();
         if is_stopped {
             return true;
         }

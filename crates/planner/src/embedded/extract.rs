@@ -23,22 +23,22 @@ struct Timing {
     end: Option<NodeId>,
 }
 
-/// Number of choices replayed between two calls of `goes_on`.
+/// Number of choices replayed between two calls of `may_continue`.
 const STEPS_PER_QUESTION: usize = 16;
 
 /// Returns the plan for these choices, with every happening as early as possible. Returns `None` if
-/// the validator rejects it, or `goes_on` returned `false`.
+/// the validator rejects it, or `may_continue` returned `false`.
 pub(crate) fn plan_of(
     task: &Task,
     situation: &Situation,
     compiled: &Compiled,
     steps: &[Step],
-    goes_on: &mut dyn FnMut() -> bool,
+    may_continue: &mut dyn FnMut() -> bool,
 ) -> Option<(TimeTriggeredPlan, validate::Report)> {
     let mut replay = Replay::new(compiled);
     for (number, &step) in steps.iter().enumerate() {
         replay.take(step)?;
-        if number % STEPS_PER_QUESTION == STEPS_PER_QUESTION - 1 && !goes_on() {
+        if number % STEPS_PER_QUESTION == STEPS_PER_QUESTION - 1 && !may_continue() {
             return None;
         }
     }
@@ -63,7 +63,7 @@ pub(crate) fn plan_of(
         exact_times(compiled, &state.network, log, (task.epsilon(), &exact))?
     } else {
         // A linear program over all happenings can take longer than all earlier steps.
-        if !goes_on() {
+        if !may_continue() {
             return None;
         }
         symbolic::solve(&state, compiled, &exact)?

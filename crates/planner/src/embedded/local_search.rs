@@ -49,7 +49,7 @@ pub(crate) struct WorkMeter<'a> {
     pub(crate) evaluated: u64,
     /// Called with the work done so far, and the number of states.
     pub(crate) should_continue: &'a mut dyn FnMut(u64, u64) -> bool,
-    /// `true` once `goes_on` has returned `false`.
+    /// `true` once `may_continue` has returned `false`.
     pub(crate) is_stopped: bool,
 }
 

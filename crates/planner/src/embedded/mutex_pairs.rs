@@ -36,15 +36,15 @@ pub(crate) struct MutexPairs {
 
 impl MutexPairs {
     /// Computes the pairs from an initial state on. Returns `None` if that exceeds `most_work`, if nothing is
-    /// spurious or dead, or once `goes_on` returns `false`.
+    /// spurious or dead, or once `may_continue` returns `false`.
     pub(crate) fn of(
         compiled: &Compiled,
         state: &State,
         most_work: u64,
-        goes_on: &mut dyn FnMut() -> bool,
+        may_continue: &mut dyn FnMut() -> bool,
     ) -> Option<Self> {
         let model = Model::of(compiled, most_work)?;
-        let mut finder = Finder::new(&model, most_work, goes_on);
+        let mut finder = Finder::new(&model, most_work, may_continue);
         let reached = finder.forward(state)?;
         let live = finder.backward(&reached)?;
         let may_start = finder.is_live.iter().zip(&model.operators);
@@ -94,15 +94,15 @@ struct Finder<'a> {
     retained: Vec<u64>,
     budget: work::Budget,
     should_continue: &'a mut dyn FnMut() -> bool,
-    /// Work done before the last call of `goes_on`.
+    /// Work done before the last call of `may_continue`.
     work_at_last_call: u64,
 }
 
-/// Work between two calls of `goes_on`: some milliseconds.
+/// Work between two calls of `may_continue`: some milliseconds.
 const WORK_BETWEEN_CALLS: u64 = 2_000_000;
 
 impl<'a> Finder<'a> {
-    fn new(model: &'a Model, most_work: u64, goes_on: &'a mut dyn FnMut() -> bool) -> Self {
+    fn new(model: &'a Model, most_work: u64, may_continue: &'a mut dyn FnMut() -> bool) -> Self {
         let words = model.atom_count.div_ceil(64);
         Self {
             model,
@@ -111,7 +111,7 @@ impl<'a> Finder<'a> {
             context: vec![0; words],
             retained: vec![0; words],
             budget: work::Budget::new(most_work),
-            should_continue: goes_on,
+            should_continue: may_continue,
             work_at_last_call: 0,
         }
     }

@@ -245,9 +245,9 @@ impl<'a> Planner<'a> {
         if !tuning.uses(Technique::MutexPairs) || compiled.is_symbolic {
             return false;
         }
-        let mut goes_on = || observe(progress).is_continue();
+        let mut may_continue = || observe(progress).is_continue();
         let most_work = tuning.most_mutex_pair_work;
-        let find = || MutexPairs::of(compiled, &root(compiled), most_work, &mut goes_on);
+        let find = || MutexPairs::of(compiled, &root(compiled), most_work, &mut may_continue);
         frame.mutex_pairs.get_or_init(find).is_some()
     }
 
@@ -296,8 +296,8 @@ impl<'a> Planner<'a> {
         let (frame, symmetry, unreported) = (self.frame, self.symmetry, self.unreported);
         let search = entrant.search(frame, symmetry);
         let mut base = self.progress.counts;
-        let mut hear = |report| self.process_report(&mut base, report);
-        let mut strand = Worker::new(frame, None, unreported, &mut hear);
+        let mut on_report = |report| self.process_report(&mut base, report);
+        let mut strand = Worker::new(frame, None, unreported, &mut on_report);
         let (outcome, spent, _) = strand.work(search, allowance);
         let is_over = outcome == Outcome::Over;
         let is_all = !search.is_incomplete() && (search.joins() || !frame.compiled.needs_joining);
@@ -335,12 +335,12 @@ impl<'a> Planner<'a> {
             let unreported = if jobs.is_empty() { unreported } else { 0 };
             let own_task = (number > 0).then_some(&own_task);
             let budget = budget.saturating_mul(entrant.strategy.share);
-            jobs.push(Box::new(move |tell: ReportCallback<'_>| {
+            jobs.push(Box::new(move |on_report: ReportCallback<'_>| {
                 let own_task = own_task.map(Task::with_own_table);
                 let task = own_task.as_ref().unwrap_or(frame.task);
                 let search = entrant.search(frame, symmetry);
                 let turns = left.unwrap_or_else(|| share(search, budget, compiled));
-                let mut strand = Worker::new(Frame { task, ..frame }, None, unreported, tell);
+                let mut strand = Worker::new(Frame { task, ..frame }, None, unreported, on_report);
                 let (outcome, _, _) = strand.work(search, SearchBudget::turns(turns));
                 let is_over = outcome == Outcome::Over;
                 let is_all = !search.is_incomplete() && (search.joins() || !compiled.needs_joining);
@@ -421,23 +421,23 @@ impl<'a> Planner<'a> {
             .found
             .filter(|found| is_better(found, self.best.as_deref()));
         let is_found = found.is_some();
-        let mut goes_on = self.report_to_caller(found);
-        if !goes_on
+        let mut may_continue = self.report_to_caller(found);
+        if !may_continue
             && let Some(pending) = report.pending
             && is_better(&pending, self.best.as_deref())
         {
             self.report_to_caller(Some(pending));
         }
-        if !goes_on {
+        if !may_continue {
             self.stopped = Some(Stopped::Interrupted);
         } else if is_found && self.is_first_plan_enough() || self.is_cleanup_over() {
             self.stopped = Some(Stopped::FirstPlan);
-            goes_on = false;
+            may_continue = false;
         } else if self.progress.counts.memory > self.frame.settings.max_memory {
             self.stopped = Some(Stopped::OutOfMemory);
-            goes_on = false;
+            may_continue = false;
         }
-        goes_on
+        may_continue
     }
 
     /// Reports the progress, and a new best plan, to the caller. Returns `false` to stop.
@@ -470,8 +470,8 @@ impl<'a> Planner<'a> {
             frame,
             ..
         } = self;
-        let mut goes_on = || observe(progress).is_continue();
-        deadline_explanation::pairs_proof(names, frame.compiled, &mut goes_on)
+        let mut may_continue = || observe(progress).is_continue();
+        deadline_explanation::pairs_proof(names, frame.compiled, &mut may_continue)
     }
 }
 

@@ -15,14 +15,14 @@ use elbowroom_verify::no_plan::{Instances, ReachedFacts};
 use super::{Effort, EffortExhausted};
 
 /// Maximum number of states.
-const MOST_STATES: usize = 5_000;
+const MAX_STATES: usize = 5_000;
 
 /// Maximum number of generated states.
-const MOST_GENERATED: usize = 200_000;
+const MAX_GENERATED: usize = 200_000;
 
 /// Maximum number of running actions. Without it, an action that may overlap itself could run any
 /// number of times.
-const MOST_RUNNING: usize = 6;
+const MAX_RUNNING: usize = 6;
 
 /// Work for the expansion of a state, and for each generated state: see [`Effort`].
 const STATE_WORK: u64 = 500;
@@ -105,7 +105,7 @@ fn states(
     let mut made = 0;
     let mut add = |node: Node, nodes: &mut Vec<Option<Node>>, open: &mut VecDeque<usize>| {
         made += 1;
-        if node.running.len() > MOST_RUNNING {
+        if node.running.len() > MAX_RUNNING {
             return Err(Failure::TooMany);
         }
         // The verifier also compares states with the listed ones before bounds are widened.
@@ -141,7 +141,7 @@ fn states(
         open.push_back(nodes.len());
         nodes.push(Some(node));
         count += 1;
-        if count > MOST_STATES || made > MOST_GENERATED {
+        if count > MAX_STATES || made > MAX_GENERATED {
             return Err(Failure::TooMany);
         }
         Ok(())

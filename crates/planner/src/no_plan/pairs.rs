@@ -7,10 +7,10 @@ use elbowroom_verify::no_plan::pairs::{Bounds, Claims, Earliest, Key, Structure}
 use super::{Effort, EffortExhausted};
 
 /// Maximum number of atoms, and of actions.
-const MOST_ELEMENTS: usize = 1_000;
+const MAX_ELEMENTS: usize = 1_000;
 
 /// Maximum number of looked-up bounds (some seconds).
-const MOST_LOOKUPS: usize = 200_000_000;
+const MAX_LOOKUPS: usize = 200_000_000;
 
 /// Number of looked-up bounds per unit of work: see [`Effort`].
 const LOOKUPS_PER_WORK: u64 = 10;
@@ -28,7 +28,7 @@ pub(super) fn claims(
     structure: &Structure<'_>,
     effort: &mut Effort<'_>,
 ) -> Result<Claims, Failure> {
-    if structure.atom_count() > MOST_ELEMENTS || structure.action_count() > MOST_ELEMENTS {
+    if structure.atom_count() > MAX_ELEMENTS || structure.action_count() > MAX_ELEMENTS {
         return Err(Failure::TooMany);
     }
     let mut table = Table::of(structure);
@@ -126,7 +126,7 @@ impl<'a> Table<'a> {
             if !changed {
                 return Ok(());
             }
-            if looks > MOST_LOOKUPS {
+            if looks > MAX_LOOKUPS {
                 return Err(Failure::TooMany);
             }
         }

@@ -165,9 +165,9 @@ pub(super) fn for_each_tuple(
         };
         for object in problem.objects_of(&next.types) {
             tuple.push(object);
-            let goes_on = extend(problem, parameters, tuple, visit);
+            let may_continue = extend(problem, parameters, tuple, visit);
             tuple.pop();
-            if !goes_on {
+            if !may_continue {
                 return false;
             }
         }

@@ -167,14 +167,14 @@ impl Bounds {
         &self,
         model: &Model,
         network: &mut PrunedNetwork<'_>,
-        outlook: &BoundContext<'_>,
+        action_values: &BoundContext<'_>,
         separations: &Separations,
     ) -> Bound {
         let probability = network.actions_probability();
         if probability <= 0.0 {
             return Bound::IMPOSSIBLE;
         }
-        let Some(needed) = self.needed(network, outlook) else {
+        let Some(needed) = self.needed(network, action_values) else {
             return Bound::IMPOSSIBLE;
         };
         let is_durative = |id: &&InstanceId| {
@@ -188,7 +188,7 @@ impl Bounds {
             bounds: self,
             model,
             network,
-            outlook,
+            action_values,
             is_counted: vec![false; model.facts.len()],
             bound: probability,
         };
@@ -208,10 +208,10 @@ impl Bounds {
     fn needed(
         &self,
         network: &PrunedNetwork<'_>,
-        outlook: &BoundContext<'_>,
+        action_values: &BoundContext<'_>,
     ) -> Option<Vec<InstanceId>> {
         let mut needed: Vec<InstanceId> = network.running().to_vec();
-        if !outlook.must_work {
+        if !action_values.must_work {
             return Some(needed);
         }
         let mut open: Vec<(usize, bool)> = self.goal.clone();
@@ -229,7 +229,7 @@ impl Bounds {
                 continue;
             }
             if !matches!(
-                (outlook.nominal.truth(fact), truth),
+                (action_values.nominal.truth(fact), truth),
                 (Truth::False, true) | (Truth::True, false)
             ) {
                 continue;
@@ -240,14 +240,14 @@ impl Bounds {
             for setter in self.setters[fact].iter().filter(|s| s.makes_true == truth) {
                 match setter.by {
                     None => {
-                        is_open |= outlook.has_timed;
-                        has_any |= outlook.has_timed;
+                        is_open |= action_values.has_timed;
+                        has_any |= action_values.has_timed;
                     }
                     Some(id) if network.running().contains(&id) => {
                         is_open |= setter.at_end;
                         has_any |= setter.at_end;
                     }
-                    Some(id) if (outlook.is_free)(id) => {
+                    Some(id) if (action_values.is_free)(id) => {
                         has_any = true;
                         is_open |= only.is_some_and(|other| other != id);
                         only = Some(id);
@@ -273,7 +273,7 @@ struct Run<'a, 'm, 'n> {
     bounds: &'a Bounds,
     model: &'a Model,
     network: &'n mut PrunedNetwork<'m>,
-    outlook: &'a BoundContext<'a>,
+    action_values: &'a BoundContext<'a>,
     is_counted: Vec<bool>,
     bound: f64,
 }
@@ -395,8 +395,8 @@ impl Run<'_, '_, '_> {
     /// Returns `true` if only the end of `id` can still change the fact, and the fact does not have
     /// the required value yet.
     fn is_last_to_set(&self, id: InstanceId, fact: usize, truth: bool) -> bool {
-        let nominal = self.outlook.nominal.truth(fact);
-        if !self.outlook.must_work || nominal != Truth::from(!truth) {
+        let nominal = self.action_values.nominal.truth(fact);
+        if !self.action_values.must_work || nominal != Truth::from(!truth) {
             return false;
         }
         let mut is_set = false;
@@ -414,9 +414,9 @@ impl Run<'_, '_, '_> {
 
     fn is_pending(&self, setter: &Setter) -> bool {
         match setter.by {
-            None => self.outlook.has_timed,
+            None => self.action_values.has_timed,
             Some(id) if self.network.running().contains(&id) => setter.at_end,
-            Some(id) => (self.outlook.is_free)(id),
+            Some(id) => (self.action_values.is_free)(id),
         }
     }
 
@@ -433,8 +433,8 @@ impl Run<'_, '_, '_> {
         let chain = Chain::of(self.model.spontaneous_changes[fact], truth);
         let of = |p: f64| if truth { p } else { 1.0 - p };
         // If an effect must establish the value, the present value is irrelevant.
-        let must_be_set =
-            self.outlook.must_work && self.outlook.nominal.truth(fact) == Truth::from(!truth);
+        let must_be_set = self.action_values.must_work
+            && self.action_values.nominal.truth(fact) == Truth::from(!truth);
         let mut best: f64 = 0.0;
         if !must_be_set {
             best = chain.best_after(of(self.network.marginal_at(fact)), steps);

@@ -347,7 +347,7 @@ impl<'s, 'w> Run<'s, 'w> {
     fn bound(&mut self) -> Bound {
         let is_used = &self.is_used;
         let is_free = |id: InstanceId| !is_used[id.index()];
-        let outlook = BoundContext {
+        let action_values = BoundContext {
             nominal: &self.nominal,
             must_work: self.must_work,
             is_free: &is_free,
@@ -356,7 +356,7 @@ impl<'s, 'w> Run<'s, 'w> {
         self.search.bounds.bound(
             self.model,
             &mut self.network,
-            &outlook,
+            &action_values,
             &self.search.separations,
         )
     }

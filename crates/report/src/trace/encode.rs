@@ -254,7 +254,7 @@ impl ObservationLine {
                 value: exact(value),
                 time,
             },
-            Event::Asked(request) => Self::from_request(request, time),
+            Event::Requested(request) => Self::from_request(request, time),
             Event::PlanMade => Self::PlanMade { time },
             Event::PlanReady => Self::PlanReady { time },
             Event::Unintelligible { said, why } => Self::Unintelligible {
@@ -347,7 +347,7 @@ impl ObservationLine {
             Self::Resume { time } => (Request::Resume, time),
             _ => return None,
         };
-        Some((Event::Asked(request), &time.0))
+        Some((Event::Requested(request), &time.0))
     }
 }
 

@@ -483,7 +483,7 @@ pub struct Replay {
     line: usize,
     first: usize,
     difference: Option<Difference>,
-    is_to_end: Arc<AtomicBool>,
+    must_end: Arc<AtomicBool>,
 }
 
 impl Replay {
@@ -495,7 +495,7 @@ impl Replay {
             line: stored.first_number(),
             first: stored.first_number(),
             difference: None,
-            is_to_end: Arc::default(),
+            must_end: Arc::default(),
         }
         .with_lookahead()
     }
@@ -503,7 +503,7 @@ impl Replay {
     /// Returns the flag that is set when the replay reaches the point at which the run was
     /// interrupted.
     pub fn interruption(&self) -> Arc<AtomicBool> {
-        Arc::clone(&self.is_to_end)
+        Arc::clone(&self.must_end)
     }
 
     fn with_lookahead(self) -> Self {
@@ -512,8 +512,8 @@ impl Replay {
     }
 
     fn look_ahead(&self) {
-        let is_to_end = matches!(self.stored.front(), Some(Line::Interrupted(_)));
-        self.is_to_end.store(is_to_end, Ordering::SeqCst);
+        let must_end = matches!(self.stored.front(), Some(Line::Interrupted(_)));
+        self.must_end.store(must_end, Ordering::SeqCst);
     }
 
     /// Returns the number of equal entries, and the first difference, if any.

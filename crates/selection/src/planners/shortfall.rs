@@ -52,7 +52,7 @@ impl Embedded<'_> {
     }
 
     fn may_continue(&self) -> bool {
-        self.may_continue.is_none_or(|goes_on| goes_on())
+        self.may_continue.is_none_or(|may_continue| may_continue())
     }
 
     /// Returns the deadlines that are missed.
@@ -62,8 +62,8 @@ impl Embedded<'_> {
             return Vec::new();
         }
         let conditions: Vec<&Condition> = deadlines.iter().map(|it| it.1).collect();
-        let goes_on = &mut || self.may_continue();
-        let mut effort = Effort::of(self.certificate_work, goes_on);
+        let may_continue = &mut || self.may_continue();
+        let mut effort = Effort::of(self.certificate_work, may_continue);
         let any_ends = with_any_ends(situation);
         let least = earliest_times(task, &any_ends, &conditions, &mut effort);
         let mut least = least.unwrap_or_default().into_iter();

@@ -91,15 +91,15 @@ impl SampleSet {
         let Some(executor) = executor else {
             return false;
         };
-        let goes_on = matches!(beginning, EntryPoint::Continue);
+        let may_continue = matches!(beginning, EntryPoint::Continue);
         let amid = MidExecutionStart {
             belief: self.belief.clone(),
-            plan_events: if goes_on {
+            plan_events: if may_continue {
                 scene.plan_events.to_vec()
             } else {
                 Vec::new()
             },
-            running: if goes_on {
+            running: if may_continue {
                 scene.running.clone()
             } else {
                 BTreeMap::new()

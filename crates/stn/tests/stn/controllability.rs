@@ -300,16 +300,16 @@ fn rational(network: &UncertainNetwork<i64>) -> UncertainNetwork {
     UncertainNetwork::new(requirements, links.collect()).unwrap()
 }
 
-/// Executes a network against the spoiler. Returns `true` if every requirement held in the end.
+/// Executes a network against the adversary. Returns `true` if every requirement held in the end.
 fn survives(board: &Board, network: &UncertainNetwork, random: &mut Random) -> bool {
-    let spoiler = Adversary::new(network.clone(), NodeId(0));
+    let adversary = Adversary::new(network.clone(), NodeId(0));
     let mut happened: Vec<Option<Rational>> = vec![None; board.count];
     happened[0] = Some(Rational::ZERO);
     let eagerness = 1 + random.below(4);
     for now in 0..=board.horizon {
         let now = Rational::from(now);
         loop {
-            for link in spoiler.ends_now(&now, &happened) {
+            for link in adversary.ends_now(&now, &happened) {
                 happened[network.link(link).end.index()] = Some(now.clone());
             }
             let free: Vec<usize> = (0..board.count)

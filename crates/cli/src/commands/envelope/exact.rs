@@ -24,7 +24,7 @@ use elbowroom_executive::messages::count_with_noun;
 /// Maximum number of reasons printed for an inequality; `--json` has all.
 const REASONS_SHOWN: usize = 2;
 /// Maximum number of digits of a printed exact volume; larger volumes are printed as powers of ten.
-const MOST_DIGITS: usize = 24;
+const MAX_DIGITS: usize = 24;
 
 /// Prints the region.
 pub(super) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
@@ -209,7 +209,7 @@ fn volume(measure: &Measure, boxes: &[BoxAnswer], look: TextLayout, text: &mut S
     match (&measure.volume, measure.log10_interval) {
         (Some(volume), _) => {
             let exact = volume.0.to_string();
-            let words = if exact.len() > MOST_DIGITS {
+            let words = if exact.len() > MAX_DIGITS {
                 format!(
                     "volume: 10^{:.2}, exact (--json has all digits)",
                     measure.log10

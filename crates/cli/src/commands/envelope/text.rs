@@ -270,7 +270,7 @@ fn condition_text(conditions: &Conditions) -> Option<String> {
 /// States the benefit of knowing the values in advance, in one sentence.
 fn foresight_text(foresight: &ValueOfInformation) -> String {
     /// Maximum number of entries of a list.
-    const MOST_NAMED: usize = 4;
+    const MAX_NAMED: usize = 4;
     let more = &foresight.weak_width.0 - &foresight.width.0;
     let much = if foresight.width.0.is_zero() {
         format!("{} wider", number::nearest(&more))
@@ -281,7 +281,7 @@ fn foresight_text(foresight: &ValueOfInformation) -> String {
     let named: Vec<&str> = foresight
         .unknown
         .iter()
-        .take(MOST_NAMED)
+        .take(MAX_NAMED)
         .map(String::as_str)
         .collect();
     let others = foresight.unknown.len() - named.len();
@@ -316,14 +316,14 @@ fn quantity(range: &Range) -> &str {
 /// Lists the durations that do not vary because the executor chooses them.
 fn chosen_durations_text(chosen: &[ChosenDuration]) -> Option<String> {
     /// Maximum number of entries of a list.
-    const MOST_NAMED: usize = 4;
+    const MAX_NAMED: usize = 4;
     let mut named: Vec<String> = chosen
         .iter()
-        .take(MOST_NAMED)
+        .take(MAX_NAMED)
         .map(|one| format!("{} {}", one.action, number::nearest(&one.duration.0)))
         .collect();
-    if chosen.len() > MOST_NAMED {
-        named.push(format!("and {} more", chosen.len() - MOST_NAMED));
+    if chosen.len() > MAX_NAMED {
+        named.push(format!("and {} more", chosen.len() - MAX_NAMED));
     }
     let named = named.join(", ");
     (!chosen.is_empty())

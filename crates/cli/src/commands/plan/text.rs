@@ -155,11 +155,11 @@ pub(super) fn failure(failure: PlannerFailure) -> Failure {
 }
 
 /// Maximum number of lines of an excerpt.
-const MOST_LINES: usize = 12;
+const MAX_LINES: usize = 12;
 
 fn with_excerpt(message: String, title: &str, excerpt: &str, help: &str) -> Failure {
     let lines: Vec<&str> = excerpt.lines().collect();
-    let shown = &lines[lines.len().saturating_sub(MOST_LINES)..];
+    let shown = &lines[lines.len().saturating_sub(MAX_LINES)..];
     let mut text = message;
     if !shown.is_empty() {
         let _ = write!(text, "\n  {title}:");

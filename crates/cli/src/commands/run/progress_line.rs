@@ -12,7 +12,7 @@ use elbowroom_executive::clock::Clock;
 use elbowroom_executive::messages::{count_with_noun, escape_control};
 
 /// Maximum number of running actions that are named.
-const MOST_NAMED: usize = 3;
+const MAX_NAMED: usize = 3;
 
 /// Line with the time, the running actions, and the number of new plans.
 pub(super) struct ProgressLine {
@@ -37,9 +37,9 @@ impl ProgressLine {
     fn show(&mut self, now: &Rational, is_planning: bool) {
         let (running, replans) = (&self.running, self.replans);
         self.line.show(self.clock.elapsed(), || {
-            let mut names: Vec<String> = running.values().take(MOST_NAMED).cloned().collect();
-            if running.len() > MOST_NAMED {
-                names.push(format!("and {} more", running.len() - MOST_NAMED));
+            let mut names: Vec<String> = running.values().take(MAX_NAMED).cloned().collect();
+            if running.len() > MAX_NAMED {
+                names.push(format!("and {} more", running.len() - MAX_NAMED));
             }
             let what = match (is_planning, names.is_empty()) {
                 (true, _) => "planning".to_owned(),

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use elbowroom::answers::learn::known_sections;
 use elbowroom::execute::{
-    AdversaryError, AdversarySettings, FirstPlan, FirstPlanError, MOST_STATES, NamedText, RunSpec,
+    AdversaryError, AdversarySettings, FirstPlan, FirstPlanError, MAX_STATES, NamedText, RunSpec,
     SpecError, WorldNames,
 };
 use elbowroom::execution::run::{PlanningTime, RunningRule};
@@ -40,7 +40,7 @@ pub(in crate::commands) fn of(
         has_plan: arguments.plan().is_some(),
         seed: arguments.seed,
         planning_budget: Some(arguments.planning_budget.clone()),
-        planner_states: arguments.planner_states.unwrap_or(MOST_STATES),
+        planner_states: arguments.planner_states.unwrap_or(MAX_STATES),
         improve_states: arguments.improve_states,
         self_overlap: arguments.self_overlap,
         threads: threads_of(arguments, &arguments.planner)?,
@@ -106,8 +106,8 @@ pub(in crate::commands) fn of(
         Some(FirstPlanChoice::Likeliest) => FirstPlan::Likeliest,
         None => spec.usual_first_plan(),
     };
-    spec.plans_aside = spec.can_plan_in_background();
-    spec.readies_aside = spec.plans_aside;
+    spec.plans_in_background = spec.can_plan_in_background();
+    spec.prepares_in_background = spec.plans_in_background;
     Ok((spec, names))
 }
 

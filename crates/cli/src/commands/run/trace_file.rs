@@ -8,7 +8,7 @@ use crate::exit::Failure;
 use elbowroom_executive::messages::io_error_message;
 
 /// Limit on the size of a trace that is kept in memory, in bytes.
-const MOST_BUFFERED: usize = 32 << 20;
+const MAX_BUFFERED: usize = 32 << 20;
 
 /// A trace file. Each line is passed to the operating system immediately, so that a killed run
 /// leaves its trace.
@@ -46,7 +46,7 @@ impl TraceFile {
     pub(super) fn write(&mut self, line: &str) {
         match (&mut self.file, &self.error) {
             (Some((file, _)), None) => self.error = file.write_all(line.as_bytes()).err(),
-            (None, _) if self.buffered.len() < MOST_BUFFERED => self.buffered.push_str(line),
+            (None, _) if self.buffered.len() < MAX_BUFFERED => self.buffered.push_str(line),
             _ => {}
         }
     }

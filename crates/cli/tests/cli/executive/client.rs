@@ -16,9 +16,9 @@ use crate::command::root;
 
 pub(crate) const TOKEN: &str = "a-token-of-some-length";
 
-/// Polling interval. With [`MOST_GLANCES`], polling ends after one minute.
+/// Polling interval. With [`MAX_GLANCES`], polling ends after one minute.
 const GLANCE: Duration = Duration::from_millis(20);
-const MOST_GLANCES: usize = 3000;
+const MAX_GLANCES: usize = 3000;
 
 /// A folder that no other test uses.
 pub(crate) fn folder(name: &str) -> PathBuf {
@@ -157,7 +157,7 @@ impl Executive {
     pub(crate) fn end(&mut self) -> Output {
         let mut child = self.child.take().expect("it runs");
         let mut is_over = || child.try_wait().expect("it can be asked").is_some();
-        let in_time = (0..MOST_GLANCES).any(|_| {
+        let in_time = (0..MAX_GLANCES).any(|_| {
             std::thread::sleep(GLANCE);
             is_over()
         });
@@ -235,7 +235,7 @@ impl Executive {
     /// Waits for the page, which exists once the executive has accepted the problem.
     pub(crate) fn page(&self) -> String {
         let mut last = String::new();
-        for _ in 0..MOST_GLANCES {
+        for _ in 0..MAX_GLANCES {
             let (status, text) = self.page_now();
             match status {
                 200 => return text,
@@ -251,7 +251,7 @@ impl Executive {
     #[track_caller]
     pub(crate) fn await_state(&self, is_so: impl Fn(&Value) -> bool) -> Value {
         let mut last = Value::Null;
-        for _ in 0..MOST_GLANCES {
+        for _ in 0..MAX_GLANCES {
             let (status, state) = self.get("/v1/state");
             if status == 200 && is_so(&state) {
                 return state;

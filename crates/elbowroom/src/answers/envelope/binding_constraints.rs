@@ -15,7 +15,7 @@ const SHARPENING_DIVISOR: i64 = 1_000_000_000;
 /// tried larger steps.
 const STEP_DOUBLINGS: usize = 1;
 /// Reasons further out than this share of the nominal value are not reported as limits.
-const MOST_REPORTED_DISTANCE: (i64, i64) = (1, 4);
+const MAX_REPORTED_DISTANCE: (i64, i64) = (1, 4);
 
 /// Returns the limits of the lower and the upper end of each parameter's interval; `None` if there
 /// is none, or if time ran out.
@@ -35,8 +35,7 @@ pub(super) fn limits_of_ends(
         } else if how.relative.is_none() && !nominal.is_zero() {
             // The search may have tried this end in large steps only; a smaller step finds the
             // nearest limit.
-            let near =
-                &nominal * &Rational::new(MOST_REPORTED_DISTANCE.0, MOST_REPORTED_DISTANCE.1);
+            let near = &nominal * &Rational::new(MAX_REPORTED_DISTANCE.0, MAX_REPORTED_DISTANCE.1);
             *distance = near.min(distance.clone());
         }
     }
@@ -46,7 +45,7 @@ pub(super) fn limits_of_ends(
         // An end that can move by this step may still be stopped by a larger step.
         let is_open = |end: &BoxEnd| words[end.parameter.index()][end.side.index()].is_none();
         let open: Vec<BoxEnd> = BoxEnd::all(words.len()).filter(is_open).collect();
-        let mut tell = |end: BoxEnd, limit: &Limit| {
+        let mut on_limit = |end: BoxEnd, limit: &Limit| {
             let own = (end.parameter, end.side);
             let reason = subject
                 .explainer
@@ -59,7 +58,7 @@ pub(super) fn limits_of_ends(
             envelope,
             which,
             &mut || continue_or_stop(watcher),
-            &mut tell,
+            &mut on_limit,
         );
         if continue_or_stop(watcher).is_break() {
             break;

@@ -13,11 +13,11 @@ use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan, Side};
 use serde::{Deserialize, Serialize};
 
 /// Largest number of nodes of a plan whose inequalities are written.
-const MOST_TIMES: usize = 400;
+const MAX_TIMES: usize = 400;
 /// Largest number of inequalities that are written.
-const MOST_ROWS: usize = 5_000;
+const MAX_ROWS: usize = 5_000;
 /// Largest number of positions that are distinguished for a moment inside an action.
-const MOST_POSITIONS: usize = 64;
+const MAX_POSITIONS: usize = 64;
 
 /// The times and parameters of a plan, and the inequalities that they satisfy.
 ///
@@ -64,11 +64,11 @@ impl Inequalities {
     /// written as rows.
     pub fn of(explainer: &Explainer<'_>) -> Option<Self> {
         let (task, plan) = (explainer.task, explainer.plan);
-        if plan.plan.nodes.len() > MOST_TIMES {
+        if plan.plan.nodes.len() > MAX_TIMES {
             return None;
         }
         let ranges = DecoupledEnvelope::ranges(plan);
-        let form = LinearForm::new(task, plan, &ranges, &plan.nominal(), MOST_POSITIONS).ok()?;
+        let form = LinearForm::new(task, plan, &ranges, &plan.nominal(), MAX_POSITIONS).ok()?;
         let requirements: Vec<RequirementRow> = form
             .obligations
             .iter()
@@ -81,7 +81,7 @@ impl Inequalities {
             .collect();
         let cases = requirements.iter().flat_map(|it| &it.broken_if);
         let rows = network.len() + cases.map(Vec::len).sum::<usize>();
-        (rows <= MOST_ROWS).then(|| Self {
+        (rows <= MAX_ROWS).then(|| Self {
             times: plan
                 .plan
                 .nodes()

@@ -147,13 +147,13 @@ impl Services {
         };
         let action_values = executor.needs().action_values.then(|| {
             let budget = work::Budget::new(planner().work);
-            let goes_on = || !budget.is_spent();
+            let may_continue = || !budget.is_spent();
             action_values(
                 request.task,
                 world,
                 Some(planner()),
                 Settings::default(),
-                &goes_on,
+                &may_continue,
             )
             .ok()
         });

@@ -13,7 +13,7 @@ use elbowroom_report::console::{
 };
 
 /// Maximum number of losses, or of possible gains, that are listed.
-const MOST_ROWS: usize = 12;
+const MAX_ROWS: usize = 12;
 
 /// Minimum share that is listed.
 const NEGLIGIBLE: f64 = 0.000_05;
@@ -135,14 +135,14 @@ fn losses(text: &mut String, order: &OrderAnswer, look: TextLayout) {
         return;
     }
     heading(text, "Causes of failure");
-    let others: f64 = losses.iter().skip(MOST_ROWS).map(|loss| loss.mass).sum();
+    let others: f64 = losses.iter().skip(MAX_ROWS).map(|loss| loss.mass).sum();
     let mut rows: Vec<Vec<String>> = losses
         .iter()
-        .take(MOST_ROWS)
+        .take(MAX_ROWS)
         .map(|loss| vec![number(loss.mass), loss.at.clone(), reason(&loss.reason)])
         .collect();
-    if losses.len() > MOST_ROWS {
-        let elsewhere = format!("{} more", losses.len() - MOST_ROWS);
+    if losses.len() > MAX_ROWS {
+        let elsewhere = format!("{} more", losses.len() - MAX_ROWS);
         rows.push(vec![number(others), elsewhere, String::new()]);
     }
     table(text, &["lost", "at", "cause"], rows, look);
@@ -194,7 +194,7 @@ fn gains(text: &mut String, odds: &Odds, look: TextLayout) {
     }
     ways.retain(|(p, _)| *p - order.probability >= NEGLIGIBLE);
     ways.sort_by(|a, b| b.0.total_cmp(&a.0));
-    ways.truncate(MOST_ROWS);
+    ways.truncate(MAX_ROWS);
     heading(text, "Possible improvements");
     let row = |p: f64, what: String| vec![number(p), what];
     let mut rows: Vec<Vec<String>> = Vec::new();

@@ -9,7 +9,7 @@ use elbowroom_verify::no_plan::NoPlan;
 use super::{PlanAnswer, PlanFinding, PlanStop, SearchMonitor};
 
 /// Work limit for the certificate of an answer: about a minute.
-const MOST_WORK: u64 = 500_000_000;
+const MAX_WORK: u64 = 500_000_000;
 
 impl SearchMonitor<'_> {
     /// Returns the finding for the embedded planner's claim that no plan exists.
@@ -50,8 +50,8 @@ impl SearchMonitor<'_> {
         unproved: &str,
     ) -> (PlanFinding, PlanStop) {
         let situation = Situation::initial(task);
-        let mut goes_on = || self.watcher.flow().is_continue();
-        let mut effort = Effort::of(MOST_WORK, &mut goes_on);
+        let mut may_continue = || self.watcher.flow().is_continue();
+        let mut effort = Effort::of(MAX_WORK, &mut may_continue);
         match no_plan_certificate_within(task, &situation, &mut effort) {
             Ok(certificate) => {
                 let finding = PlanFinding::NoPlan {

@@ -242,15 +242,15 @@ fn compare_candidates(
 ) -> (Option<EvaluatedPlan>, Option<(PlanValue, Rational)>) {
     let mut best: Option<EvaluatedPlan> = None;
     let mut shortest: Option<(PlanValue, Rational)> = None;
-    let mut judge: Option<PlanEvaluator<'_>> = None;
+    let mut evaluator: Option<PlanEvaluator<'_>> = None;
     while let Some(candidate) = source.next(&mut |states| course.report_progress(states, None)) {
         course.plans += 1;
         let elapsed = course.elapsed();
         course.first.get_or_insert(elapsed);
         let known = best.as_ref().map(|best| &best.value);
         // After planning, the task's table contains the facts of plans.
-        let judge = judge.get_or_insert_with(|| PlanEvaluator::of(request, task));
-        let value = judge.value(&candidate.plan, known, course);
+        let evaluator = evaluator.get_or_insert_with(|| PlanEvaluator::of(request, task));
+        let value = evaluator.value(&candidate.plan, known, course);
         let Some(value) = value else {
             // Interrupted: the first plan is returned with an unknown value, a later one is
             // dropped.

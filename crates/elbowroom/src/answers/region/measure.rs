@@ -12,9 +12,9 @@ use super::sampling::estimate;
 use super::{BoxAnswer, Exact};
 
 /// Largest number of connected parameters that are measured exactly.
-const MOST_EXACT: usize = 6;
+const MAX_EXACT: usize = 6;
 /// Work limit of the exact measurement, in faces of faces. Beyond it, the volume is sampled.
-const MOST_SIDES: usize = 300_000;
+const MAX_SIDES: usize = 300_000;
 /// The quantile of the standard normal distribution for intervals of 95 %.
 const NORMAL_QUANTILE: f64 = 1.96;
 
@@ -142,8 +142,8 @@ fn size_of_component(
     seed: u64,
     flow: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<Size> {
-    if component.parameters.len() <= MOST_EXACT
-        && let Some(volume) = component.volume(MOST_SIDES, flow)
+    if component.parameters.len() <= MAX_EXACT
+        && let Some(volume) = component.volume(MAX_SIDES, flow)
     {
         return Some(Size::Exact(volume));
     }

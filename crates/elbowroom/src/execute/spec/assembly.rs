@@ -160,7 +160,7 @@ impl RunInputs {
         Ok(Box::new(ControlledWorld::new(sim, spoiling)))
     }
 
-    /// Returns the planner of the run, with `clock` and `goes_on` as in [`Embedded`]. The embedded planner's first plan
+    /// Returns the planner of the run, with `clock` and `may_continue` as in [`Embedded`]. The embedded planner's first plan
     /// is chosen by [`RunSpec::first_plan`]; other planners return their only plan.
     ///
     /// # Errors
@@ -168,11 +168,11 @@ impl RunInputs {
     pub fn planner<'a>(
         &self,
         clock: &'a (dyn Fn() -> Rational + Sync),
-        goes_on: &'a (dyn Fn() -> bool + Sync),
+        may_continue: &'a (dyn Fn() -> bool + Sync),
     ) -> Result<Box<dyn Planner + 'a>, SpecError> {
         let planner = self
             .spec
-            .planner_of_new_plans(self.beliefs.as_ref(), clock, goes_on)?;
+            .planner_of_new_plans(self.beliefs.as_ref(), clock, may_continue)?;
         let is_embedded = matches!(self.spec.planner_choice()?, PlannerChoice::Embedded);
         let known = self.first_plan_knowledge().filter(|_| is_embedded);
         let Some(known) = known else {
@@ -188,7 +188,7 @@ impl RunInputs {
                 .as_ref()
                 .map_or(u64::MAX, planning_work),
             knowledge: known,
-            may_continue: goes_on,
+            may_continue,
         };
         Ok(Box::new(SelectingPlanner {
             inner: planner,
@@ -312,9 +312,15 @@ impl RunInputs {
     ) -> Result<Arc<dyn ActionValues>, String> {
         let embedded = self.spec.embedded();
         let budget = work::Budget::new(embedded.work);
-        let goes_on = || !budget.is_spent();
+        let may_continue = || !budget.is_spent();
         let planner = is_embedded.then_some(embedded);
-        action_values(&self.task, model, planner, Settings::default(), &goes_on)
+        action_values(
+            &self.task,
+            model,
+            planner,
+            Settings::default(),
+            &may_continue,
+        )
     }
 }
 
@@ -333,7 +339,7 @@ impl RunSpec {
     }
 
     /// Returns the planner that [`Self::planner`] names, with the limits of the run, and with
-    /// `clock` and `goes_on` as in [`Embedded`]. For executors that compare plans, it returns the likeliest plan in the
+    /// `clock` and `may_continue` as in [`Embedded`]. For executors that compare plans, it returns the likeliest plan in the
     /// world of `model`. It does not choose among plans for the first one.
     ///
     /// # Errors
@@ -342,11 +348,11 @@ impl RunSpec {
         &self,
         model: Option<&WorldModel>,
         clock: &'a (dyn Fn() -> Rational + Sync),
-        goes_on: &'a (dyn Fn() -> bool + Sync),
+        may_continue: &'a (dyn Fn() -> bool + Sync),
     ) -> Result<Box<dyn Planner + 'a>, SpecError> {
         let embedded = Embedded {
             clock: Some(clock),
-            may_continue: Some(goes_on),
+            may_continue: Some(may_continue),
             ..self.embedded()
         };
         Ok(match self.planner_choice()? {
@@ -370,7 +376,7 @@ impl RunSpec {
                         ..external::Settings::default()
                     },
                     stops_at_first_plan: limit.is_none(),
-                    may_continue: goes_on,
+                    may_continue,
                 })
             }
         })

@@ -28,13 +28,13 @@ fn errands(script: Vec<(i64, Event)>, quarters: &[i64]) -> (RunResult, Vec<Situa
     let script = script
         .into_iter()
         .map(|(time, event)| (seconds(time), event));
-    let (mut world, is_to_end) = announcing_world((200, script.collect()), &planner, quarters);
+    let (mut world, must_end) = announcing_world((200, script.collect()), &planner, quarters);
     let execution = Execution::of(&task)
         .with_envelopes(irr())
         .by("guarded".parse().expect("a registered one"))
         .with_settings(settings())
         .persistent(true);
-    let told = run_recorded_in(execution, &task, &planner, &mut world, &is_to_end);
+    let told = run_recorded_in(execution, &task, &planner, &mut world, &must_end);
     let asked = planner.state().requested.clone();
     (told, asked)
 }
@@ -48,8 +48,8 @@ fn repeated_goal() -> Event {
 fn late_actions_after_pause_are_predicted_in_plan_order() {
     let (told, asked) = errands(
         vec![
-            (13, Event::Asked(Request::Pause)),
-            (40, Event::Asked(Request::Resume)),
+            (13, Event::Requested(Request::Pause)),
+            (40, Event::Requested(Request::Resume)),
             (41, repeated_goal()),
         ],
         &[],
@@ -131,7 +131,7 @@ fn run_with_endless_walk(
 ) -> (RunResult, ScriptedBackgroundPlanner) {
     let scene = Scene::new(DOMAIN, PROBLEM, Some(PLAN));
     let planner = ScriptedBackgroundPlanner::with_planning_times(&[seconds(1)]);
-    let (inner, is_to_end) = announcing_world((20, script), &planner, &[]);
+    let (inner, must_end) = announcing_world((20, script), &planner, &[]);
     let walk = [("(walk)", seconds(50))];
     let durations = [&walk, durations].concat();
     let mut world = Deviating {
@@ -143,7 +143,7 @@ fn run_with_endless_walk(
         .by("guarded".parse().expect("a registered one"))
         .beginning_with(scene.plan.clone())
         .with_settings(settings());
-    let told = run_recorded_in(execution, &scene.task, &planner, &mut world, &is_to_end);
+    let told = run_recorded_in(execution, &scene.task, &planner, &mut world, &must_end);
     assert_has(&told, &["14: (walk) must end by 15.3", "15.3: plan"]);
     (told, planner)
 }

@@ -243,7 +243,7 @@ pub(crate) struct RunResult {
 
 pub(crate) fn settings() -> RunSettings {
     RunSettings {
-        plans_aside: true,
+        plans_in_background: true,
         monitors_slack: true,
         ..RunSettings::default()
     }
@@ -255,7 +255,7 @@ pub(crate) fn announcing_world(
     planner: &ScriptedBackgroundPlanner,
     quarters: &[i64],
 ) -> (AnnouncingWorld, Arc<AtomicBool>) {
-    let is_to_end = Arc::new(AtomicBool::new(false));
+    let must_end = Arc::new(AtomicBool::new(false));
     let script = script.into_iter();
     let script = script.map(|(time, event)| Observation { time, event });
     let world = AnnouncingWorld {
@@ -263,7 +263,7 @@ pub(crate) fn announcing_world(
             now: Rational::ZERO,
             coming: script.collect(),
             end: Rational::from(end),
-            stop_requested: Arc::clone(&is_to_end),
+            stop_requested: Arc::clone(&must_end),
             slow: None,
             on_cancel: None,
         },
@@ -271,7 +271,7 @@ pub(crate) fn announcing_world(
         quarters: quarters.to_vec(),
         started: 0,
     };
-    (world, is_to_end)
+    (world, must_end)
 }
 
 pub(crate) fn run_recorded(
@@ -281,8 +281,8 @@ pub(crate) fn run_recorded(
     planner: &ScriptedBackgroundPlanner,
     quarters: &[i64],
 ) -> RunResult {
-    let (mut world, is_to_end) = announcing_world(script, planner, quarters);
-    run_recorded_in(execution, task, planner, &mut world, &is_to_end)
+    let (mut world, must_end) = announcing_world(script, planner, quarters);
+    run_recorded_in(execution, task, planner, &mut world, &must_end)
 }
 
 /// Runs in that world until it sets the flag.
@@ -291,9 +291,9 @@ pub(crate) fn run_recorded_in(
     task: &Arc<Task>,
     planner: &ScriptedBackgroundPlanner,
     world: &mut dyn World,
-    is_to_end: &Arc<AtomicBool>,
+    must_end: &Arc<AtomicBool>,
 ) -> RunResult {
-    let is_to_end = Arc::clone(is_to_end);
+    let must_end = Arc::clone(must_end);
     let (notes, lines) = (Notes::default(), Arc::default());
     let report = execution
         .with_planner(planner.clone())
@@ -302,7 +302,7 @@ pub(crate) fn run_recorded_in(
             task: Arc::clone(task),
             lines: Arc::clone(&lines),
         })
-        .with_stop_check(move || is_to_end.load(Ordering::SeqCst))
+        .with_stop_check(move || must_end.load(Ordering::SeqCst))
         .run_in(world);
     let notes = notes.0.lock().unwrap_or_else(PoisonError::into_inner);
     let lines = lines.lock().unwrap_or_else(PoisonError::into_inner);

@@ -108,8 +108,8 @@ fn requests_during_search_are_handled_at_once() {
         (3, pursue("odd", "(have spoon)")),
         (4, pursue("key", "(have key)")),
         (5, fact(&task, "(here cup)", false)),
-        (6, Event::Asked(Request::Pause)),
-        (7, Event::Asked(Request::Resume)),
+        (6, Event::Requested(Request::Pause)),
+        (7, Event::Requested(Request::Resume)),
     ];
     let told = run_persistent(&task, 100, script, &planner);
     assert_has(
@@ -168,8 +168,8 @@ fn pause_during_search_delays_adoption() {
     let task = task("", "(have book)");
     let planner = ScriptedBackgroundPlanner::with_planning_times(&[seconds(10)]);
     let script = vec![
-        (5, Event::Asked(Request::Pause)),
-        (30, Event::Asked(Request::Resume)),
+        (5, Event::Requested(Request::Pause)),
+        (30, Event::Requested(Request::Resume)),
     ];
     let told = run_persistent(&task, 100, script, &planner);
     assert_has(

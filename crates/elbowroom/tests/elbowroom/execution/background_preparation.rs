@@ -22,7 +22,7 @@ use crate::execution::scene::irr;
 
 fn execution<'a>(task: &Arc<Task>, executor: &str) -> Execution<'a> {
     let settings = RunSettings {
-        readies_aside: true,
+        prepares_in_background: true,
         ..settings()
     };
     Execution::of(task)
@@ -97,8 +97,8 @@ fn requests_during_preparation_are_handled_at_once() {
         (3, pursue("odd", "(have spoon)")),
         (4, pursue("key", "(have key)")),
         (5, fact(&task, "(here cup)", false)),
-        (6, Event::Asked(Request::Pause)),
-        (7, Event::Asked(Request::Resume)),
+        (6, Event::Requested(Request::Pause)),
+        (7, Event::Requested(Request::Resume)),
     ];
     let told = run(&task, 200, script, &planner);
     assert_has(&told, &["3: it is not a valid goal", "rest: goal-reached"]);

@@ -64,7 +64,7 @@ fn run_with_background_planner(fast_pace: u32, seconds: i64, readying: &[Rationa
     let planner = ScriptedBackgroundPlanner::with_planning_times(&[seconds.into()])
         .with_preparation_times(readying);
     let execution = scene.execution("live").with_settings(RunSettings {
-        readies_aside: !readying.is_empty(),
+        prepares_in_background: !readying.is_empty(),
         ..settings()
     });
     let execution = execution.with_preparer(ScriptedBackgroundPreparer(

@@ -39,8 +39,8 @@ impl RandomScript {
             let event = match dice.below(10) {
                 0..=5 => pursue(item, &format!("(have {item})")),
                 6..=7 => abandon(item),
-                8 => Event::Asked(Request::Pause),
-                _ => Event::Asked(Request::Resume),
+                8 => Event::Requested(Request::Pause),
+                _ => Event::Requested(Request::Resume),
             };
             script.push((Rational::new(dice.small(600), 10), event));
         }
@@ -55,7 +55,7 @@ impl RandomScript {
             script.push((seconds(61), fact(task, &format!("(here {item})"), true)));
         }
         // The run always resumes in the end.
-        script.push((seconds(61), Event::Asked(Request::Resume)));
+        script.push((seconds(61), Event::Requested(Request::Resume)));
         script.push((seconds(62), pursue("last", "(and (have book) (have key))")));
         let lengths = (0..12).map(|_| Rational::new(dice.small(150), 10));
         let lengths = lengths.collect();

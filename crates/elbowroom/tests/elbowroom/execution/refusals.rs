@@ -59,11 +59,11 @@ fn run_with_refusals(
     tenths: i64,
     script: Vec<(Rational, Event)>,
     is_lasting: bool,
-    plans_aside: bool,
+    plans_in_background: bool,
 ) -> (Vec<f64>, Vec<String>, Verdict) {
     let task = task("", "(have book)");
     let planner = ScriptedBackgroundPlanner::with_planning_times(&[Rational::ZERO]);
-    let (inner, is_to_end) = announcing_world((300, script), &planner, &[]);
+    let (inner, must_end) = announcing_world((300, script), &planner, &[]);
     let mut world = Refusing {
         inner,
         before: Rational::new(tenths, 10),
@@ -72,13 +72,13 @@ fn run_with_refusals(
     let report = Execution::of(&task)
         .by("stn".parse().expect("a registered one"))
         .with_settings(RunSettings {
-            plans_aside,
+            plans_in_background,
             ..RunSettings::default()
         })
         .persistent(is_lasting)
         .with_planner(planner)
         .recorded_by(notes.clone())
-        .with_stop_check(move || is_to_end.load(Ordering::SeqCst))
+        .with_stop_check(move || must_end.load(Ordering::SeqCst))
         .run_in(&mut world);
     let notes = notes.0.lock().expect("not poisoned").clone();
     let starts = notes.iter().filter(|it| it.contains(": start"));
@@ -126,8 +126,8 @@ fn backoff_ends_with_any_other_event() {
     ];
     let asked = vec![(Rational::from(7), pursue("cup", "(have cup)"))];
     let paused = vec![
-        (Rational::from(7), Event::Asked(Request::Pause)),
-        (Rational::from(8), Event::Asked(Request::Resume)),
+        (Rational::from(7), Event::Requested(Request::Pause)),
+        (Rational::from(8), Event::Requested(Request::Resume)),
     ];
     for (script, is_soon) in [(seen, true), (asked, true), (paused, false)] {
         let (starts, notes, _) = run_with_refusals(65, script, true, true);

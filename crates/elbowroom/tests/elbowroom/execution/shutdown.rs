@@ -45,14 +45,14 @@ fn run(
     world: &mut dyn World,
     planner: &mut dyn Planner,
     recorder: &mut dyn Recorder,
-    is_to_end: &(dyn Fn() -> bool + Sync),
+    must_end: &(dyn Fn() -> bool + Sync),
 ) -> Report {
     scene
         .execution(executor)
         .with_planner(planner)
         .recorded_by(recorder)
         .with_explanations()
-        .with_stop_check(is_to_end)
+        .with_stop_check(must_end)
         .run_in(world)
 }
 
@@ -221,7 +221,7 @@ fn stopped_run_shuts_down_and_replays() {
     for executor in ["fixed:30", "stn", "guarded", "live", "esterel"] {
         for limit in 0..12 {
             let asked = AtomicUsize::new(0);
-            let is_to_end = || asked.fetch_add(1, Ordering::SeqCst) + 1 > limit;
+            let must_end = || asked.fetch_add(1, Ordering::SeqCst) + 1 > limit;
             let mut text = String::new();
             let mut sink = |line: &str| text.push_str(line);
             let mut writer = TraceWriter::new(Arc::clone(&scene.task), &mut sink);
@@ -234,7 +234,7 @@ fn stopped_run_shuts_down_and_replays() {
                 &mut world,
                 &mut planner,
                 &mut writer,
-                &is_to_end,
+                &must_end,
             );
             if report.verdict == Verdict::GoalReached {
                 continue;

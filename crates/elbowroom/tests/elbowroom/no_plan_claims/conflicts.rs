@@ -24,8 +24,8 @@ fn conflict_of(task: &Task) -> (Vec<String>, Vec<(String, Condition)>) {
 
 fn is_impossible(task: &Task, parts: &[&Condition]) -> bool {
     let goal = Condition::And(parts.iter().map(|part| (*part).clone()).collect());
-    let (task, mut goes_on) = (task.with_goal(goal), || true);
-    let mut effort = Effort::of(10_000_000, &mut goes_on);
+    let (task, mut may_continue) = (task.with_goal(goal), || true);
+    let mut effort = Effort::of(10_000_000, &mut may_continue);
     no_plan_certificate_within(&task, &Situation::initial(&task), &mut effort).is_ok()
 }
 

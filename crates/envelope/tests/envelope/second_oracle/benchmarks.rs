@@ -23,7 +23,7 @@ use crate::second_oracle::z3::Z3;
 use crate::skipped::skipped;
 
 /// Default limit on the time points of a generator plan that is checked.
-const MOST_NODES: u64 = 12;
+const MAX_NODES: u64 = 12;
 
 #[test]
 fn boxes_are_inside_and_maximal_by_published_encoding() {
@@ -36,7 +36,7 @@ fn boxes_are_inside_and_maximal_by_published_encoding() {
         skipped("there is no z3 here");
         return;
     };
-    let most_nodes = setting("ELBOWROOM_NODES", MOST_NODES);
+    let most_nodes = setting("ELBOWROOM_NODES", MAX_NODES);
     let epsilon = Rational::new(1, 1000);
     let mut tally = Tally::default();
     let wanted = std::env::var("ELBOWROOM_INSTANCES").unwrap_or_default();
@@ -69,7 +69,7 @@ fn boxes_are_inside_and_maximal_by_published_encoding() {
         }
         let (inside, boxes) = (tally.inside, tally.boxes);
         println!("{}: {inside} of {boxes} boxes inside", instance.name);
-        if is_generator && nodes > MOST_NODES {
+        if is_generator && nodes > MAX_NODES {
             continue;
         }
         for index in 0..plan.parameters.len() {

@@ -24,7 +24,7 @@ use crate::second_oracle::system::System;
 use crate::second_oracle::z3::{Found, Z3};
 
 /// Limit on groups of happenings that the plain oracle examines for one box.
-const MOST_GROUPS: usize = 1500;
+const MAX_GROUPS: usize = 1500;
 
 /// Query for a box.
 #[derive(Clone, Debug)]
@@ -391,7 +391,7 @@ impl Contest<'_> {
             self.plan,
             &self.case.epsilon,
             envelope,
-            MOST_GROUPS,
+            MAX_GROUPS,
         );
         match plain {
             Err(GaveUp::TooManyOrders) => self.tally.count("plain: too many orders"),

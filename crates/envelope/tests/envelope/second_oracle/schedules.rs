@@ -12,7 +12,7 @@ use elbowroom_num::{End, Interval, Rational};
 use elbowroom_plan::{Bound, DecoupledEnvelope, ParametrizedPlan};
 
 /// Limit on branches that are examined.
-const MOST_BRANCHES: usize = 200_000;
+const MAX_BRANCHES: usize = 200_000;
 
 /// A multiple of infinity, and a number.
 type Extended = (i64, Rational);
@@ -34,7 +34,7 @@ enum Limit {
 pub(crate) fn are_missing(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Option<bool> {
     let edges = edges(plan);
     let mut branches: Vec<BTreeMap<usize, Extended>> = vec![BTreeMap::new()];
-    for _ in 0..MOST_BRANCHES {
+    for _ in 0..MAX_BRANCHES {
         let Some(chosen) = branches.pop() else {
             return Some(false);
         };

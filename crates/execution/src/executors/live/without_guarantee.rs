@@ -107,8 +107,8 @@ impl ExecutedPlan {
         if !lacks_numbers && !guarantee_status::lacks_time(reason) {
             return ReductionClass::Impossible;
         }
-        let mut hopes = [ReductionClass::AtMostHalf, ReductionClass::MoreThanHalf].into_iter();
-        let first = hopes.find(|hope| self.schedules_with_reduction(*hope, now).is_some());
+        let mut reductions = [ReductionClass::AtMostHalf, ReductionClass::MoreThanHalf].into_iter();
+        let first = reductions.find(|hope| self.schedules_with_reduction(*hope, now).is_some());
         first.unwrap_or_default()
     }
 

@@ -27,10 +27,10 @@ impl Policy {
         &'a self,
         belief: &'a BeliefState,
         period: usize,
-        outlook: &dyn ActionValues,
+        action_values: &dyn ActionValues,
         started: Option<&'a str>,
     ) -> DecisionState<'a> {
-        let length = outlook.period();
+        let length = action_values.period();
         let since = |start: &Rational| {
             let from = (start - evaluation_tolerance(length)).max(Rational::ZERO);
             count(&(from / length).ceil()).min(period)
@@ -54,12 +54,14 @@ impl Policy {
         weighed: &RankedMoves,
         belief: &BeliefState,
         period: usize,
-        outlook: &dyn ActionValues,
+        action_values: &dyn ActionValues,
     ) -> f64 {
         let after = |order: &Order| {
             let name = order.action.name.as_str();
-            let standing = self.decision_state(belief, period, outlook, Some(name));
-            outlook.evaluate(&standing).map_or(0.0, |it| it.best())
+            let standing = self.decision_state(belief, period, action_values, Some(name));
+            action_values
+                .evaluate(&standing)
+                .map_or(0.0, |it| it.best())
         };
         match &kept.decision {
             Decision::Start(orders) => orders.iter().map(after).fold(1.0, f64::min),

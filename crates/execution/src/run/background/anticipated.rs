@@ -101,12 +101,12 @@ impl AnticipatedReplan {
     }
 
     /// Returns the foreseen situation if it is near and the execution was as foreseen. Small
-    /// differences in time are permitted if plans are made in the background (`plans_aside`).
+    /// differences in time are permitted if plans are made in the background (`plans_in_background`).
     pub(in crate::run) fn for_request(
         self,
         guess: OverrunEstimate,
         view: &RunView<'_>,
-        plans_aside: bool,
+        plans_in_background: bool,
     ) -> Option<AnticipatedSituation> {
         let PredictedState {
             situation, running, ..
@@ -120,7 +120,7 @@ impl AnticipatedReplan {
         let (exactly, tickets) = view.situation_at(situation.time.clone(), guess);
         let is_guess = exactly != *situation || tickets != *running;
         let is_as_foreseen = !is_guess
-            || plans_aside
+            || plans_in_background
                 && match &self.abandoned {
                     Some(left) => left.was_as_anticipated && !self.is_outdated,
                     None => self.matches_forecast(view),

@@ -275,7 +275,7 @@ impl BackgroundSearch {
         };
         let is_begun = |it: &ExpectedStart| view.log.ticket(it.step).is_some();
         // With background preparation, steps that have not begun are part of the prepared plan.
-        let is_due = view.settings.readies_aside
+        let is_due = view.settings.prepares_in_background
             || *view.now >= self.query.start.situation.time
             || self.query.start.expected.iter().all(is_begun);
         let waits_for_report = !view.are_all_starts_reported()

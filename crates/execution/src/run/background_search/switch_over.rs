@@ -43,7 +43,7 @@ impl Run<'_> {
             && !self.is_as_expected(&search)
             && let Some(fit) = search.fit_to_present(plan, &self.view())
         {
-            if self.settings.readies_aside {
+            if self.settings.prepares_in_background {
                 // The fitted plan includes all events so far.
                 self.plan_events.clear();
             }
@@ -79,7 +79,7 @@ impl Run<'_> {
             return self.search_again(&query.reason);
         }
         let as_made = (plan.clone(), start.situation.clone(), start.running.clone());
-        if self.settings.readies_aside {
+        if self.settings.prepares_in_background {
             self.begin_preparation(search, as_made, false);
             return Ok(());
         }
@@ -131,7 +131,7 @@ impl Run<'_> {
         fit: StartedPlan,
         fallback: impl FnOnce(BackgroundSearch) -> PreparationFallback,
     ) {
-        if self.settings.readies_aside {
+        if self.settings.prepares_in_background {
             self.begin_preparation(search, fit, true);
             return;
         }

@@ -10,7 +10,7 @@ use elbowroom::report::trace::{ClosedGoalLine, GoalLine, SnapshotLine, WaitLine}
 use super::super::documents::{GoalNow, GoalsNow, OpenGoal};
 
 /// Maximum number of closed goals in the list.
-const MOST_CLOSED: usize = 1000;
+const MAX_CLOSED: usize = 1000;
 
 const QUEUED: &str = "queued";
 const PURSUED: &str = "pursued";
@@ -229,7 +229,7 @@ impl GoalList {
                 ..goal
             });
         }
-        let surplus = self.closed.len().saturating_sub(MOST_CLOSED);
+        let surplus = self.closed.len().saturating_sub(MAX_CLOSED);
         self.closed.drain(..surplus);
     }
 }

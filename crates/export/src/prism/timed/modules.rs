@@ -89,7 +89,7 @@ impl Process<'_> {
             deletes,
             ..
         } = happening;
-        let goes_on = self.over_all_after(&self.world.acts[act], *adds, *deletes);
+        let may_continue = self.over_all_after(&self.world.acts[act], *adds, *deletes);
         match happening.owner {
             Owner::Started(own) if own == act => {
                 let begins = format!("({since}'=1)");
@@ -118,8 +118,8 @@ impl Process<'_> {
                 let _ = writeln!(text, "  [{label}] {guard} -> ({since}'=0)&({ends}'=0);");
             }
             _ => {
-                if let Some(goes_on) = goes_on {
-                    let keep = |name: &str| format!("({name}'=(({goes_on}) ? {name} : 0))");
+                if let Some(may_continue) = may_continue {
+                    let keep = |name: &str| format!("({name}'=(({may_continue}) ? {name} : 0))");
                     let _ = writeln!(
                         text,
                         "  [{label}] true -> {}&{};",
@@ -135,8 +135,8 @@ impl Process<'_> {
     pub(super) fn can_start(&self, act: &ActionModel) -> Formula {
         let needs = self.holds(&act.start.needs);
         let over_all = act.rest.iter().map(|(over_all, _)| {
-            let goes_on = self.over_all_after(act, act.start.adds, act.start.deletes);
-            goes_on.unwrap_or_else(|| self.holds(over_all))
+            let may_continue = self.over_all_after(act, act.start.adds, act.start.deletes);
+            may_continue.unwrap_or_else(|| self.holds(over_all))
         });
         Formula::all(std::iter::once(needs).chain(over_all))
     }

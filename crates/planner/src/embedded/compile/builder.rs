@@ -34,14 +34,14 @@ use crate::embedded::formula::Formula;
 use crate::embedded::time::{Scale, Ticks};
 use crate::embedded::tuning::Tuning;
 
-/// Number of actions compiled between two calls of `goes_on`.
+/// Number of actions compiled between two calls of `may_continue`.
 const ACTIONS_PER_QUESTION: usize = 256;
 
 /// Reason why there is no compiled problem.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Failure {
     Unsupported(Unsupported),
-    /// `goes_on` returned `false`.
+    /// `may_continue` returned `false`.
     Stopped,
 }
 
@@ -56,16 +56,16 @@ pub(crate) struct CompileInput<'a> {
 }
 
 /// Compiles `grounding`, the part of `task` that is reachable from the situation. Stops when
-/// `goes_on` returns `false`.
+/// `may_continue` returns `false`.
 pub(crate) fn compile(
     task: &Task,
     grounding: &Grounding,
     wanted: CompileInput<'_>,
-    goes_on: &mut dyn FnMut() -> bool,
+    may_continue: &mut dyn FnMut() -> bool,
 ) -> Result<Compiled, Failure> {
     let CompileInput { situation, .. } = wanted;
-    let mut full = full_actions(task, grounding, goes_on).ok_or(Failure::Stopped)?;
-    if !goes_on() {
+    let mut full = full_actions(task, grounding, may_continue).ok_or(Failure::Stopped)?;
+    if !may_continue() {
         return Err(Failure::Stopped);
     }
     let mut builder = Builder::new(task);
@@ -93,7 +93,7 @@ pub(crate) fn compile(
     for (number, action) in grounding.actions.iter().enumerate() {
         check(action).map_err(Failure::Unsupported)?;
         builder.links_of(action);
-        if number % ACTIONS_PER_QUESTION == ACTIONS_PER_QUESTION - 1 && !goes_on() {
+        if number % ACTIONS_PER_QUESTION == ACTIONS_PER_QUESTION - 1 && !may_continue() {
             return Err(Failure::Stopped);
         }
     }
@@ -114,12 +114,12 @@ pub(crate) fn compile(
         } else {
             builder.variants(action, full.as_ref().unwrap_or(action));
         }
-        if number % ACTIONS_PER_QUESTION == ACTIONS_PER_QUESTION - 1 && !goes_on() {
+        if number % ACTIONS_PER_QUESTION == ACTIONS_PER_QUESTION - 1 && !may_continue() {
             return Err(Failure::Stopped);
         }
     }
     let mut compiled = builder
-        .finish(grounding, wanted, scale, goes_on)
+        .finish(grounding, wanted, scale, may_continue)
         .ok_or(Failure::Stopped)?;
     compiled.macros = Macro::all(&compiled);
     Ok(compiled)

@@ -12,11 +12,11 @@ use elbowroom_model::{ground, problem};
 /// part of a disjunction that other parts decide, or an expression that is constant because such an
 /// effect never happens. These parts still interfere.
 ///
-/// Returns `None` if `goes_on` returned `false`.
+/// Returns `None` if `may_continue` returned `false`.
 pub(super) fn full_actions(
     task: &Task,
     grounding: &Grounding,
-    goes_on: &mut dyn FnMut() -> bool,
+    may_continue: &mut dyn FnMut() -> bool,
 ) -> Option<Vec<Option<ground::Action>>> {
     let schemas = &task.problem().schemas;
     let perhaps = ConditionalWrites::of(schemas);
@@ -36,7 +36,7 @@ pub(super) fn full_actions(
             }
             // Instantiating an action with quantifiers can take a millisecond.
             let full = task.instantiate(action.schema, &action.arguments).ok();
-            goes_on().then_some(full)
+            may_continue().then_some(full)
         })
         .collect()
 }

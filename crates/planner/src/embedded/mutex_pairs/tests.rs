@@ -224,8 +224,8 @@ proptest! {
         let compiled = compiled(&task);
         let state = root(&compiled);
         let model = Model::of(&compiled, u64::MAX).expect("no limit");
-        let mut goes_on = || true;
-        let mut finder = Finder::new(&model, u64::MAX, &mut goes_on);
+        let mut may_continue = || true;
+        let mut finder = Finder::new(&model, u64::MAX, &mut may_continue);
         let reached = finder.forward(&state).expect("no limit");
         let twin = ReferenceTable::of(&model, &state);
         prop_assert_eq!(pairs_of(&reached, model.atom_count), twin.reached.clone());

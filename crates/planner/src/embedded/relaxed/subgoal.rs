@@ -6,7 +6,7 @@ use super::{Estimate, Relaxed, UNREACHED};
 
 /// The additional cost of an operator that can start only at the end of the present plan, where
 /// work is spread.
-const MOST_LATENESS: Ticks = 7;
+const MAX_LATENESS: Ticks = 7;
 
 /// A part of the goal, as propositions of the relaxed problem.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -78,7 +78,7 @@ impl Relaxed<'_> {
         let starts = graph.operators.iter().zip(&deadlines.earliest_starts);
         let costs = starts.map(|(operator, &start)| {
             let wait = (start - compiled.now).clamp(0, elapsed);
-            let cost = i64::from(operator.cost) * (1 + wait * MOST_LATENESS / elapsed);
+            let cost = i64::from(operator.cost) * (1 + wait * MAX_LATENESS / elapsed);
             u8::try_from(cost).unwrap_or(u8::MAX)
         });
         (late, costs.collect())

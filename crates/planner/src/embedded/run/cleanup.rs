@@ -66,8 +66,8 @@ impl Planner<'_> {
         let memory = frame.settings.max_memory;
         nearby.limit_memory(memory.saturating_sub(self.progress.counts.memory));
         let (newest, mut base) = (self.improvement_count, self.progress.counts);
-        let mut hear = |report| self.process_report(&mut base, report);
-        let mut strand = Worker::new(frame, best, unreported, &mut hear);
+        let mut on_report = |report| self.process_report(&mut base, report);
+        let mut strand = Worker::new(frame, best, unreported, &mut on_report);
         strand.refine(&mut nearby, newest, most / OPERATOR_WORK);
         self.unreported = strand.end(false);
         if self.stopped != Some(Stopped::Interrupted) {

@@ -236,14 +236,15 @@ impl<'a> Planner<'a> {
         let (frame, newest, unreported) = (self.frame, self.improvement_count, self.unreported);
         if !self.is_refining() {
             let best = self.best.clone();
-            let mut ended = self.run_workers(vec![Box::new(move |tell: ReportCallback<'_>| {
-                let mut strand = Worker::new(frame, best, unreported, tell);
-                let (_, rest) = contest.run_turns(&mut strand, u64::MAX);
-                WorkerResult {
-                    unreported: strand.end(false),
-                    remaining: rest,
-                }
-            })]);
+            let mut ended =
+                self.run_workers(vec![Box::new(move |on_report: ReportCallback<'_>| {
+                    let mut strand = Worker::new(frame, best, unreported, on_report);
+                    let (_, rest) = contest.run_turns(&mut strand, u64::MAX);
+                    WorkerResult {
+                        unreported: strand.end(false),
+                        remaining: rest,
+                    }
+                })]);
             return ended
                 .pop()
                 .map_or(RemainingSpace::Unexplored, |ended| ended.remaining);
@@ -275,8 +276,8 @@ impl<'a> Planner<'a> {
         let first = &mut first[0];
         let best = self.best.clone();
         let mut jobs: Vec<Job<'_, WorkerResult>> =
-            vec![Box::new(move |tell: ReportCallback<'_>| {
-                let mut strand = Worker::new(frame, best, unreported, tell);
+            vec![Box::new(move |on_report: ReportCallback<'_>| {
+                let mut strand = Worker::new(frame, best, unreported, on_report);
                 let (mut work, mut rest) = (0, RemainingSpace::Unexplored);
                 if contest.is_finding {
                     (work, rest) = contest.run_turns(&mut strand, length);
@@ -297,8 +298,8 @@ impl<'a> Planner<'a> {
         if let (Some(second), Some(task)) = (others.first_mut(), &own_task) {
             let frame = Frame { task, ..frame };
             let best = self.best.clone();
-            jobs.push(Box::new(move |tell: ReportCallback<'_>| {
-                let mut strand = Worker::new(frame, best, 0, tell);
+            jobs.push(Box::new(move |on_report: ReportCallback<'_>| {
+                let mut strand = Worker::new(frame, best, 0, on_report);
                 strand.refine(second, newest, length);
                 WorkerResult {
                     unreported: strand.end(false),

@@ -13,31 +13,31 @@ pub(super) type ReportCallback<'t> = &'t mut dyn FnMut(Report) -> bool;
 /// A strand. Its reports are ignored after it was stopped.
 pub(super) type Job<'s, R> = Box<dyn FnOnce(ReportCallback<'_>) -> R + Send + 's>;
 
-/// Runs the strands. Strands whose turn has not come use at most `ahead` bytes each. `hear` is
+/// Runs the strands. Strands whose turn has not come use at most `ahead` bytes each. `on_report` is
 /// called on this thread with the number of the strand. When it returns `false`, all strands end,
 /// and the results of later strands are dropped.
 ///
-/// Returns the results in order: those of all strands, unless `hear` has returned `false`.
+/// Returns the results in order: those of all strands, unless `on_report` has returned `false`.
 pub(super) fn run_parallel<R: Send>(
     jobs: Vec<Job<'_, R>>,
     (threads, ahead): (usize, usize),
-    hear: &mut dyn FnMut(usize, Report) -> bool,
+    on_report: &mut dyn FnMut(usize, Report) -> bool,
 ) -> Vec<R> {
     #[cfg(not(target_family = "wasm"))]
     if threads > 1 && jobs.len() > 1 {
-        return threaded::run_threads(jobs, (threads, ahead), hear);
+        return threaded::run_threads(jobs, (threads, ahead), on_report);
     }
     #[cfg(target_family = "wasm")]
     let _ = (threads, ahead);
-    let mut goes_on = true;
+    let mut may_continue = true;
     let mut results = Vec::new();
     for (number, job) in jobs.into_iter().enumerate() {
         let result = job(&mut |report| {
-            goes_on = goes_on && hear(number, report);
-            goes_on
+            may_continue = may_continue && on_report(number, report);
+            may_continue
         });
         results.push(result);
-        if !goes_on {
+        if !may_continue {
             break;
         }
     }
@@ -100,11 +100,11 @@ mod threaded {
     }
 
     /// Does the same as [`run_parallel`](super::run_parallel) with several threads. The calling
-    /// thread only receives reports, because `hear` may be bound to it.
+    /// thread only receives reports, because `on_report` may be bound to it.
     pub(super) fn run_threads<R: Send>(
         jobs: Vec<Job<'_, R>>,
         (threads, ahead): (usize, usize),
-        hear: &mut dyn FnMut(usize, Report) -> bool,
+        on_report: &mut dyn FnMut(usize, Report) -> bool,
     ) -> Vec<R> {
         let workers = threads.min(jobs.len());
         let mut queue = VecDeque::new();
@@ -134,7 +134,7 @@ mod threaded {
                 while let Ok(message) = receiver.recv() {
                     match message {
                         Message::Report(report) => {
-                            if !hear(number, report) {
+                            if !on_report(number, report) {
                                 return;
                             }
                         }
@@ -175,14 +175,14 @@ mod tests {
     /// Returns jobs; strand `n` reports `n + 3` times, and returns the number of its reports.
     fn jobs<'s>() -> Vec<Job<'s, (usize, u64)>> {
         let job = |number: usize| -> Job<'s, (usize, u64)> {
-            Box::new(move |tell: ReportCallback<'_>| {
+            Box::new(move |on_report: ReportCallback<'_>| {
                 let mut made = 0;
                 while made < number as u64 + 3 {
                     made += 1;
                     let mut report = Report::default();
                     report.counts.evaluated = made;
                     report.counts.memory = number;
-                    if !tell(report) {
+                    if !on_report(report) {
                         break;
                     }
                 }

@@ -105,7 +105,7 @@ impl Worker<'_, '_> {
         self.phase = Phase::Improving;
         let before = self.counts.evaluated;
         let mut known = 0;
-        let mut goes_on = |work: u64, evaluated: u64| {
+        let mut may_continue = |work: u64, evaluated: u64| {
             let more = work - known;
             known = work;
             self.count_work(before, evaluated, more)
@@ -114,7 +114,7 @@ impl Worker<'_, '_> {
             weight: 1 + refiner.weight(),
             work: 0,
             evaluated: 0,
-            should_continue: &mut goes_on,
+            should_continue: &mut may_continue,
             is_stopped: false,
         };
         let found = work(refiner, &mut ticker);

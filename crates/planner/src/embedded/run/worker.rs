@@ -166,7 +166,7 @@ impl<'a, 't> Worker<'a, 't> {
         frame: Frame<'a>,
         best: Option<Arc<Best>>,
         unreported: u64,
-        tell: ReportCallback<'t>,
+        on_report: ReportCallback<'t>,
     ) -> Self {
         Self {
             frame,
@@ -176,7 +176,7 @@ impl<'a, 't> Worker<'a, 't> {
             unreported,
             settled: work::spent(),
             is_stopped: false,
-            on_report: tell,
+            on_report,
         }
     }
 
@@ -208,14 +208,14 @@ impl<'a, 't> Worker<'a, 't> {
     fn report(&mut self, found: Option<Arc<Best>>, pending: Option<Arc<Best>>) -> bool {
         self.unreported = 0;
         self.update_counts();
-        let goes_on = (self.on_report)(Report {
+        let may_continue = (self.on_report)(Report {
             phase: self.phase,
             counts: self.counts,
             found,
             pending,
             ..Report::default()
         });
-        self.is_stopped |= !goes_on;
+        self.is_stopped |= !may_continue;
         !self.is_stopped
     }
 
@@ -367,12 +367,12 @@ impl<'a, 't> Worker<'a, 't> {
         let whole = Arc::new(best(self.value(plan.clone(), &verdict)));
         let is_better = whole.is_better_than(self.best.as_deref());
         let pending = is_better.then(|| Arc::clone(&whole));
-        let mut goes_on = || self.report(None, pending.clone());
+        let mut may_continue = || self.report(None, pending.clone());
         let (plan, verdict) = if constrained.is_some() {
             // A constraint may need steps that the goal does not need.
             (plan, verdict)
         } else {
-            without_redundant_actions(task, situation, plan, verdict, &mut goes_on)
+            without_redundant_actions(task, situation, plan, verdict, &mut may_continue)
         };
         if self.is_stopped {
             return CandidateVerdict::Stopped;

@@ -12,7 +12,7 @@ use super::network::{Network, RequestId, ServiceClient, reliable};
 use super::{Input, warn};
 
 /// Maximum number of pending requests. Older ones are assumed to be lost.
-const MOST_OPEN: usize = 64;
+const MAX_OPEN: usize = 64;
 
 /// Message of the problem expert.
 pub(super) enum ExpertMessage {
@@ -147,7 +147,7 @@ impl Expert {
                 Err(why) => warn(&why),
             }
         }
-        while self.open.len() > MOST_OPEN {
+        while self.open.len() > MAX_OPEN {
             self.open.pop_front();
         }
         for text in self.mirror.remarks() {

@@ -18,7 +18,7 @@ use crate::total_order::Slot;
 
 /// If a suffix has more points than this, it and all longer ones are not projected: a matrix for
 /// each position in an order would cost more than it saves.
-const MOST_POINTS: usize = 40;
+const MAX_POINTS: usize = 40;
 
 /// The suffixes of a sequence, by their first position.
 #[derive(Clone, Debug)]
@@ -85,7 +85,7 @@ impl Suffixes {
                     match room.before(model, separations, (sequence[position], behind), next_timed)
                     {
                         None => SuffixNetwork::Never,
-                        Some(room) if room.points.len() > MOST_POINTS => {
+                        Some(room) if room.points.len() > MAX_POINTS => {
                             SuffixNetwork::TooManyRunning
                         }
                         Some(room) => SuffixNetwork::Projected(room),

@@ -9,7 +9,7 @@ use crate::number::{self, Rounding};
 /// Lists the bounds whose relaxation gains most, or returns `None` if there are none.
 pub(super) fn best_relaxations(best: &Best) -> Option<String> {
     /// Maximum number of entries of a list.
-    const MOST_NAMED: usize = 3;
+    const MAX_NAMED: usize = 3;
     let gain = |worth: &ShadowPrices| match best.objective {
         Objective::LeastSlack => {
             let percent = &worth.gain * &Rational::from(100);
@@ -28,7 +28,7 @@ pub(super) fn best_relaxations(best: &Best) -> Option<String> {
         }
         _ => format!("{} to the sum of the widths", number::nearest(&worth.gain)),
     };
-    let named = best.worth.iter().take(MOST_NAMED).map(|worth| {
+    let named = best.worth.iter().take(MAX_NAMED).map(|worth| {
         let relax = match worth.relax {
             Relax::More => "more",
             Relax::Less => "less",

@@ -48,7 +48,7 @@ pub(super) fn timeout_line(
     chosen: &[ChosenDuration],
 ) -> Option<String> {
     /// Maximum number of different time-outs listed, the most frequent ones.
-    const MOST_LISTED: usize = 4;
+    const MAX_LISTED: usize = 4;
     let open = parameters.iter().filter_map(|room| {
         let name = room.range.quantity.name.clone();
         Some((room.range.timeout.clone()?, name))
@@ -76,11 +76,11 @@ pub(super) fn timeout_line(
         });
     }
     let mut listed: Vec<String> = Vec::new();
-    for (timeout, names) in groups.iter().take(MOST_LISTED) {
-        let named = names.iter().take(MOST_LISTED).cloned();
+    for (timeout, names) in groups.iter().take(MAX_LISTED) {
+        let named = names.iter().take(MAX_LISTED).cloned();
         let mut named: Vec<String> = named.collect();
-        if names.len() > MOST_LISTED {
-            named.push(format!("{} more", names.len() - MOST_LISTED));
+        if names.len() > MAX_LISTED {
+            named.push(format!("{} more", names.len() - MAX_LISTED));
         }
         listed.push(format!(
             "{} for {}",
@@ -88,10 +88,10 @@ pub(super) fn timeout_line(
             named.join(", ")
         ));
     }
-    if groups.len() > MOST_LISTED {
+    if groups.len() > MAX_LISTED {
         listed.push(format!(
             "{} (--json lists them)",
-            count_with_noun(groups.len() - MOST_LISTED, "other time-out")
+            count_with_noun(groups.len() - MAX_LISTED, "other time-out")
         ));
     }
     Some(format!(

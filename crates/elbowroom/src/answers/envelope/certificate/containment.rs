@@ -17,10 +17,10 @@ use elbowroom_verify::{End, Exact};
 use super::super::Subject;
 
 /// Largest number of time points for which a certificate proves that the box is inside.
-const MOST_POINTS: usize = 500;
+const MAX_POINTS: usize = 500;
 
 /// Largest number of numbers in such a proof.
-const MOST_NUMBERS: usize = 50_000;
+const MAX_NUMBERS: usize = 50_000;
 
 /// Returns the proof that the box is inside the envelope, or `None` if it would be too large.
 pub(super) fn containment_proof(
@@ -29,7 +29,7 @@ pub(super) fn containment_proof(
     envelope: &DecoupledEnvelope,
 ) -> Option<Sound> {
     let plan = subject.plan;
-    if plan.plan.nodes.len() > MOST_POINTS {
+    if plan.plan.nodes.len() > MAX_POINTS {
         return None;
     }
     let control = oracle.control_proof(envelope);
@@ -45,7 +45,7 @@ pub(super) fn containment_proof(
             proofs.map(|proof| condition(subject, proof)).collect()
         }),
     };
-    (count_numbers(&sound) <= MOST_NUMBERS).then_some(sound)
+    (count_numbers(&sound) <= MAX_NUMBERS).then_some(sound)
 }
 
 /// Estimates how many numbers a proof contains.

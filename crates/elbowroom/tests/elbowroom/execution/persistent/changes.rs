@@ -100,7 +100,7 @@ fn invalid_request_is_ignored_with_a_remark() {
     let script = vec![
         (1, pursue("odd", "(have spoon)")),
         (2, abandon("odd")),
-        (3, Event::Asked(Request::Resume)),
+        (3, Event::Requested(Request::Resume)),
     ];
     let told = run(&task, 60, script);
     assert_has(
@@ -141,11 +141,11 @@ fn random_requests_keep_run_consistent() {
                 4 => fact(&task, &format!("(here {item})"), below(2) == 0),
                 5 if paused_at.is_none() => {
                     paused_at = Some(time);
-                    Event::Asked(Request::Pause)
+                    Event::Requested(Request::Pause)
                 }
                 6 => {
                     pauses.extend(paused_at.take().map(|from| (from, time)));
-                    Event::Asked(Request::Resume)
+                    Event::Requested(Request::Resume)
                 }
                 _ => continue,
             };
@@ -201,7 +201,7 @@ impl Planner for SlowPlanner {
 /// Returns the starts of a run whose goals are requested at these times.
 fn starts(planner: SlowPlanner, goals: &[(i64, &str, &str)], end: i64) -> Vec<(String, Rational)> {
     let task = task("", "(and)");
-    let is_to_end = Arc::new(AtomicBool::new(false));
+    let must_end = Arc::new(AtomicBool::new(false));
     let coming = goals.iter().map(|(time, name, goal)| Observation {
         time: Rational::from(*time),
         event: pursue(name, goal),
@@ -210,14 +210,14 @@ fn starts(planner: SlowPlanner, goals: &[(i64, &str, &str)], end: i64) -> Vec<(S
         now: Rational::ZERO,
         coming: coming.collect(),
         end: Rational::from(end),
-        stop_requested: Arc::clone(&is_to_end),
+        stop_requested: Arc::clone(&must_end),
         slow: None,
         on_cancel: None,
     };
     let report = Execution::of(&task)
         .with_planner(planner)
         .recorded_by(Notes::default())
-        .with_stop_check(move || is_to_end.load(Ordering::SeqCst))
+        .with_stop_check(move || must_end.load(Ordering::SeqCst))
         .persistent(true)
         .run_in(&mut world);
     let executed = report.executed.iter();

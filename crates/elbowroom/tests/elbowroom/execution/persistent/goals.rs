@@ -131,7 +131,7 @@ fn non_persistent_run_rejects_requests() {
         now: Rational::ZERO,
         coming: vec![Observation {
             time: Rational::ONE,
-            event: Event::Asked(Request::Pause),
+            event: Event::Requested(Request::Pause),
         }],
         end: Rational::from(60),
         stop_requested: Arc::default(),

@@ -32,8 +32,8 @@ fn interactive_run_with_abandoned_goal_ends_after_running_actions() {
 fn interactive_run_can_be_paused_between_actions() {
     let task = task("", "(and (have book) (have cup))");
     let script = vec![
-        (5, Event::Asked(Request::Pause)),
-        (30, Event::Asked(Request::Resume)),
+        (5, Event::Requested(Request::Pause)),
+        (30, Event::Requested(Request::Resume)),
     ];
     let told = run_interactive(&task, 100, script);
     assert_has(&told, &["0: start", "30"]);
@@ -45,9 +45,9 @@ fn interactive_run_can_be_paused_between_actions() {
     );
     // Abandoning the goal during a pause also ends the run.
     let script = vec![
-        (5, Event::Asked(Request::Pause)),
+        (5, Event::Requested(Request::Pause)),
         (6, abandon("problem")),
-        (30, Event::Asked(Request::Resume)),
+        (30, Event::Requested(Request::Resume)),
     ];
     let told = run_interactive(&task, 100, script);
     assert_eq!(told.report.verdict, Verdict::Interrupted);

@@ -9,9 +9,9 @@ use super::scripted::{assert_has, fact, pursue, run, task};
 fn pause_starts_nothing_and_running_actions_continue() {
     let task = task("", "(and (have book) (have cup))");
     let script = vec![
-        (5, Event::Asked(Request::Pause)),
+        (5, Event::Requested(Request::Pause)),
         (7, pursue("key", "(have key)")),
-        (50, Event::Asked(Request::Resume)),
+        (50, Event::Requested(Request::Resume)),
     ];
     let told = run(&task, 100, script);
     let starts = |from: i64, to: i64| {
@@ -33,8 +33,8 @@ fn pause_starts_nothing_and_running_actions_continue() {
 fn pause_across_deadline_reports_missed_deadline() {
     let task = task("(at 40 (not (power)))", "(and (have book) (have cup))");
     let script = vec![
-        (5, Event::Asked(Request::Pause)),
-        (50, Event::Asked(Request::Resume)),
+        (5, Event::Requested(Request::Pause)),
+        (50, Event::Requested(Request::Resume)),
         (60, fact(&task, "(power)", true)),
     ];
     let told = run(&task, 100, script);

@@ -135,8 +135,8 @@ fn goal_that_is_released_during_a_pause_is_pursued_afterwards() {
     let task = task("", "(have book)");
     let script = vec![
         (15, pursue_from("cup", "(have cup)", 20, None)),
-        (18, Event::Asked(Request::Pause)),
-        (35, Event::Asked(Request::Resume)),
+        (18, Event::Requested(Request::Pause)),
+        (35, Event::Requested(Request::Resume)),
     ];
     let told = run(&task, 100, script);
     assert_has(&told, &["20: `cup` released", "35: start (fetch r cup)"]);

@@ -76,8 +76,8 @@ fn script(task: &Task, dice: &mut RandomNumbers) -> Vec<Observation> {
                 },
                 measured: Vec::new(),
             },
-            10 => Event::Asked(Request::Pause),
-            _ => Event::Asked(Request::Resume),
+            10 => Event::Requested(Request::Pause),
+            _ => Event::Requested(Request::Resume),
         };
         let tenths = i64::try_from(dice.below(3000)).expect("small");
         let time = Rational::new(tenths, 10);
@@ -97,12 +97,12 @@ fn execution<'a>(task: &Arc<Task>, executor: &str) -> Execution<'a> {
 /// Returns the lines of a run by a random script, and the possible rotations.
 fn taped(executor: &str, seed: u64) -> (Vec<String>, Vec<(usize, String)>) {
     let task = example_task();
-    let is_to_end = Arc::new(AtomicBool::new(false));
+    let must_end = Arc::new(AtomicBool::new(false));
     let mut world = ScriptedWorld {
         now: Rational::ZERO,
         coming: script(&task, &mut RandomNumbers(seed)),
         end: Rational::from(320),
-        stop_requested: Arc::clone(&is_to_end),
+        stop_requested: Arc::clone(&must_end),
         slow: None,
         on_cancel: None,
     };
@@ -114,7 +114,7 @@ fn taped(executor: &str, seed: u64) -> (Vec<String>, Vec<(usize, String)>) {
             lines: &mut lines,
             rotations: &mut beginnings,
         })
-        .with_stop_check(move || is_to_end.load(Ordering::SeqCst))
+        .with_stop_check(move || must_end.load(Ordering::SeqCst))
         .run_in(&mut world);
     (lines, beginnings)
 }
@@ -216,7 +216,7 @@ fn snapshot_of_earlier_format_can_be_resumed() {
     assert!(matches!(stand.phase, RunPhase::Idle { .. }) && stand.goals.open.is_empty());
     assert!(stand.starts.is_empty() && stand.started > 0 && !stand.is_paused);
     let (now, first) = (stand.belief.time().clone(), stand.started as u64);
-    let is_to_end = Arc::new(AtomicBool::new(false));
+    let must_end = Arc::new(AtomicBool::new(false));
     let at = |seconds: i64| &now + Rational::from(seconds);
     let there = |fact: &str| crate::execution::persistent::scripted::fact(&task, fact, true);
     let event = |seconds: i64, event: Event| Observation {
@@ -232,7 +232,7 @@ fn snapshot_of_earlier_format_can_be_resumed() {
             event(2, pursue("key", "(have key)")),
         ],
         end: at(100),
-        stop_requested: Arc::clone(&is_to_end),
+        stop_requested: Arc::clone(&must_end),
         slow: None,
         on_cancel: None,
     };
@@ -245,7 +245,7 @@ fn snapshot_of_earlier_format_can_be_resumed() {
     execution(&task, "guarded")
         .resume_from(stand)
         .recorded_by(tape)
-        .with_stop_check(move || is_to_end.load(Ordering::SeqCst))
+        .with_stop_check(move || must_end.load(Ordering::SeqCst))
         .run_in(&mut world);
     let start = lines.iter().find(|it| it.contains("\"event\":\"command\""));
     let start = start.expect("it acts");

@@ -85,12 +85,12 @@ fn script(task: &Task, dice: &mut RandomNumbers) -> Vec<(Rational, Event)> {
                 completion: None,
                 note: "under way".to_owned(),
             },
-            18 => Event::Asked(Request::Pause),
-            _ => Event::Asked(Request::Resume),
+            18 => Event::Requested(Request::Pause),
+            _ => Event::Requested(Request::Resume),
         };
         script.push((Rational::new(dice.small(2400), 10), event));
     }
-    script.push((Rational::from(241), Event::Asked(Request::Resume)));
+    script.push((Rational::from(241), Event::Requested(Request::Resume)));
     script
 }
 
@@ -160,8 +160,8 @@ impl Case {
         Execution::of(task)
             .by(self.executor.parse().expect("a registered one"))
             .with_settings(RunSettings {
-                plans_aside: self.plans_in_background,
-                readies_aside: self.prepares_in_background,
+                plans_in_background: self.plans_in_background,
+                prepares_in_background: self.prepares_in_background,
                 monitors_slack: self.plans_in_background,
                 ..RunSettings::default()
             })
@@ -183,7 +183,7 @@ impl Case {
         let readying: Vec<Rational> = readying.collect();
         let planner = ScriptedBackgroundPlanner::with_planning_times(&lengths)
             .with_preparation_times(&readying);
-        let (mut world, is_to_end) = announcing_world((300, script), &planner, &quarters);
+        let (mut world, must_end) = announcing_world((300, script), &planner, &quarters);
         let segments = Arc::new(Mutex::new(vec![Segment::default()]));
         let recorder = Rotating {
             task: Arc::clone(&task),
@@ -201,7 +201,7 @@ impl Case {
         };
         execution
             .recorded_by(recorder)
-            .with_stop_check(move || is_to_end.load(Ordering::SeqCst))
+            .with_stop_check(move || must_end.load(Ordering::SeqCst))
             .run_in(&mut world);
         std::mem::take(&mut *segments.lock().expect("not poisoned"))
     }

@@ -236,7 +236,7 @@ pub(super) fn scripted(
     script: Vec<(impl Into<Rational>, Event)>,
     kind: impl FnOnce(Execution<'_>) -> Execution<'_>,
 ) -> RunResult {
-    let is_to_end = Arc::new(AtomicBool::new(false));
+    let must_end = Arc::new(AtomicBool::new(false));
     let script = script.into_iter().map(|(time, event)| Observation {
         time: time.into(),
         event,
@@ -245,7 +245,7 @@ pub(super) fn scripted(
         now: Rational::ZERO,
         coming: script.collect(),
         end: Rational::from(end),
-        stop_requested: Arc::clone(&is_to_end),
+        stop_requested: Arc::clone(&must_end),
         slow: None,
         on_cancel: None,
     };
@@ -254,7 +254,7 @@ pub(super) fn scripted(
         .with_settings(RunSettings::default())
         .with_planner(Counting(Arc::clone(&plans)))
         .recorded_by(notes.clone())
-        .with_stop_check(move || is_to_end.load(Ordering::SeqCst))
+        .with_stop_check(move || must_end.load(Ordering::SeqCst))
         .with_explanations();
     let report = kind(execution).run_in(&mut world);
     let notes = notes
@@ -320,7 +320,7 @@ fn given(name: &str, goal: &str, value: i64, deadline: Option<i64>) -> Event {
 }
 
 pub(crate) fn pursue_on(name: &str, goal: &str, terms: GoalTerms) -> Event {
-    Event::Asked(Request::Pursue {
+    Event::Requested(Request::Pursue {
         name: name.to_owned(),
         goal: goal.to_owned(),
         terms,
@@ -329,7 +329,7 @@ pub(crate) fn pursue_on(name: &str, goal: &str, terms: GoalTerms) -> Event {
 
 pub(crate) fn abandon(name: &str) -> Event {
     let name = name.to_owned();
-    Event::Asked(Request::Abandon { name })
+    Event::Requested(Request::Abandon { name })
 }
 
 pub(crate) fn fact(task: &Task, name: &str, truth: bool) -> Event {

@@ -26,7 +26,7 @@ use crate::embedded::time::{Scale, Ticks};
 use crate::embedded::tuning::Technique;
 use crate::embedded::windows::Windows;
 
-/// Number of happenings annotated between two calls of `goes_on`.
+/// Number of happenings annotated between two calls of `may_continue`.
 const SNAPS_PER_QUESTION: usize = 1024;
 
 /// The future timed initials, each with its separations.
@@ -42,13 +42,13 @@ fn longest_distance(snaps: &[Snap]) -> Ticks {
 }
 
 impl Builder<'_> {
-    /// Assembles the compiled problem. Returns `None` if `goes_on` returned `false`.
+    /// Assembles the compiled problem. Returns `None` if `may_continue` returned `false`.
     pub(super) fn finish(
         mut self,
         grounding: &Grounding,
         wanted: CompileInput<'_>,
         scale: Scale,
-        goes_on: &mut dyn FnMut() -> bool,
+        may_continue: &mut dyn FnMut() -> bool,
     ) -> Option<Compiled> {
         let situation = wanted.situation;
         let goal = self.symbols.formula(&grounding.goal);
@@ -64,9 +64,9 @@ impl Builder<'_> {
             };
         let windows = (!windows.is_empty()).then(|| Arc::new(windows));
         let annotations = Annotations::of(self.separations.iter().chain(&coming.separations));
-        self.annotate(&annotations, &coming, goes_on)?;
+        self.annotate(&annotations, &coming, may_continue)?;
         let (timed, timed_is_exact) = self.timed(&coming, &annotations, scale);
-        if !goes_on() {
+        if !may_continue() {
             return None;
         }
         self.note_compression_safe(&annotations, &timed, !strata.is_empty());
@@ -74,7 +74,7 @@ impl Builder<'_> {
         let exclusive = self.compile_drains(situation, &timed, &strata, counts_drains);
         let timed_until_goal = self.timed_until_goal(grounding, &coming);
         let (metric, cost) = self.metric(situation, &timed);
-        if !goes_on() {
+        if !may_continue() {
             return None;
         }
         let facts = self.symbols.facts;
@@ -202,13 +202,13 @@ impl Builder<'_> {
         &mut self,
         annotations: &Annotations,
         coming: &FutureTimed,
-        goes_on: &mut dyn FnMut() -> bool,
+        may_continue: &mut dyn FnMut() -> bool,
     ) -> Option<()> {
         let waiting = TimedSeparations::of(&coming.separations);
         for (number, (snap, separations)) in
             self.snaps.iter_mut().zip(&self.separations).enumerate()
         {
-            if number % SNAPS_PER_QUESTION == 0 && !goes_on() {
+            if number % SNAPS_PER_QUESTION == 0 && !may_continue() {
                 return None;
             }
             snap.after = annotations.after(separations);

@@ -12,7 +12,7 @@ use super::super::services::PLANNER;
 use super::{Server, warn_on_error};
 
 /// Maximum number of concurrent planners.
-const MOST_PLANNERS: usize = 4;
+const MAX_PLANNERS: usize = 4;
 
 impl Server {
     /// Starts a planner, unless the request is rejected. The result is an input.
@@ -38,8 +38,8 @@ impl Server {
     ) {
         let refused = if !self.nodes[PLANNER].serves() {
             Err("the planner is not active".to_owned())
-        } else if self.planning >= MOST_PLANNERS {
-            Err(format!("{MOST_PLANNERS} plans are being made already"))
+        } else if self.planning >= MAX_PLANNERS {
+            Err(format!("{MAX_PLANNERS} plans are being made already"))
         } else {
             Ok(())
         };
