@@ -171,10 +171,7 @@ impl Policy {
         let Some(within) = found.within else {
             return Ok(None);
         };
-        let discrete_events::RestrictedAgent {
-            world,
-            epochs,
-        } = within;
+        let discrete_events::RestrictedAgent { world, epochs } = within;
         let chances = cell_probabilities_of(&world, found.cells, Side::Below)?;
         let step = exact_step(&world, found.cells);
         let optimum = TimedOptimum {

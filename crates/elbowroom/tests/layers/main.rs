@@ -226,7 +226,7 @@ fn threads_are_spawned_in_the_listed_files() {
                 }
                 let text = fs::read_to_string(&path).unwrap_or_default();
                 let code = text.split("#[cfg(test)]\nmod tests").next();
-                if code.is_some_and(|code| creates_threads(code)) {
+                if code.is_some_and(creates_threads) {
                     found.push(path.file_name().expect("a name").to_owned());
                 }
             }

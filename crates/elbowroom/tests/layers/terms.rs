@@ -9,8 +9,11 @@ use serde::Serialize;
 
 use crate::workspace;
 
+/// Returns the names of a table.
+type Names = fn() -> Vec<&'static str>;
+
 /// Files that list all names of a table.
-const LISTS: &[(&str, fn() -> Vec<&'static str>)] = &[
+const LISTS: &[(&str, Names)] = &[
     ("docs/guarantees.md", || names(Guarantee::TERMS)),
     ("docs/formats/trace.md", || names(Guarantee::TERMS)),
     ("crates/python/python/elbowroom/_problem.py", || {

@@ -305,7 +305,7 @@ impl Run<'_> {
         self.goals.note_shortfall(&search.query().goals, &shortfall);
         self.check_stop_request()?;
         match answer {
-            PlanAnswer::Plan(plan) => self.process_found_plan(search, plan),
+            PlanAnswer::Plan(plan) => self.process_found_plan(search, &plan),
             answer => self.process_failed_search(&search, &answer),
         }
     }
@@ -321,7 +321,7 @@ impl Run<'_> {
         } else if self.goals.is_change_pending() {
             // Another plan is needed in any case.
             if search.has_abandoned_plan() {
-                self.with_goals(|goals, it| goals.select_after_added_goals(it));
+                self.with_goals(super::goals::GoalManager::select_after_added_goals);
             }
         } else if search.is_outdated() {
             // There was no plan from that situation, but there may be one from the present one.
@@ -339,7 +339,7 @@ impl Run<'_> {
                 }
             }
         } else if search.has_abandoned_plan()
-            || !self.with_goals(|goals, it| goals.exclude_new_goals(it))
+            || !self.with_goals(super::goals::GoalManager::exclude_new_goals)
         {
             // The situation was only a forecast.
             self.search_from_here(&query.reason);

@@ -41,9 +41,9 @@ impl Run<'_> {
     /// Makes a decision, and adds its consequences to the work queue.
     pub(super) fn decide_and_enqueue(&mut self) -> Result<(), Stop> {
         self.check_stop_request()?;
-        self.with_goals(|goals, it| goals.close_momentary_goals(it));
-        self.with_goals(|goals, it| goals.close_achieved_goals(it));
-        self.with_goals(|goals, it| goals.tend_kept_goals(it));
+        self.with_goals(super::goals::GoalManager::close_momentary_goals);
+        self.with_goals(super::goals::GoalManager::close_achieved_goals);
+        self.with_goals(super::goals::GoalManager::tend_kept_goals);
         if self.poll_planner()? || self.handle_requests()? {
             return Ok(());
         }

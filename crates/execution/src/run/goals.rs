@@ -68,6 +68,10 @@ enum Mode {
 }
 
 /// The goals of a run, and the state that depends on them.
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "each is an independent state"
+)]
 pub(super) struct GoalManager<'a> {
     mode: Mode,
     reader: Box<dyn GoalReader + 'a>,

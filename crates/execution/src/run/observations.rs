@@ -46,7 +46,7 @@ impl Run<'_> {
     pub(super) fn process_reports(&mut self, observations: Vec<Observation>) {
         let timed_before = self.belief.past_timed_initials();
         // Deadlines are later than release times.
-        self.with_goals(|goals, it| goals.release_goals(it));
+        self.with_goals(super::goals::GoalManager::release_goals);
         // For each observation, the earliest time among it and the later ones; in reverse order.
         let mut earliest: Vec<Rational> = Vec::with_capacity(observations.len());
         for observation in observations.iter().rev() {
@@ -71,8 +71,8 @@ impl Run<'_> {
         let now = self.now.clone();
         self.with_goals(|goals, it| goals.close_goals_due_before(it, &now));
         let _ = self.belief.advance(&now);
-        self.with_goals(|goals, it| goals.close_momentary_goals(it));
-        self.with_goals(|goals, it| goals.tend_kept_goals(it));
+        self.with_goals(super::goals::GoalManager::close_momentary_goals);
+        self.with_goals(super::goals::GoalManager::tend_kept_goals);
         self.record_timed_initials_while_idle(timed_before);
         (self.listener)(&self.belief);
     }

@@ -102,9 +102,9 @@ impl Run<'_> {
         }
         if self.is_search_due() && !has_goals {
             self.plan_events.clear();
-            self.with_goals(|goals, it| goals.pursue_kept_goals(it));
+            self.with_goals(super::goals::GoalManager::pursue_kept_goals);
         } else if self.is_search_due() {
-            self.with_goals(|goals, it| goals.wake(it));
+            self.with_goals(super::goals::GoalManager::wake);
             let reason = Reason::new(Cause::Surprise).about(Subject::AnyObservation);
             self.replan(&reason)?;
         } else {
@@ -197,7 +197,7 @@ impl Run<'_> {
         if self.with_goals(|goals, it| goals.select_goals_after(it, verdict)) {
             return;
         }
-        self.with_goals(|goals, it| goals.announce_goals(it));
+        self.with_goals(super::goals::GoalManager::announce_goals);
         let mut reasons = self.goals.missed_deadlines();
         let is_explained = reasons.len() == self.goals.pursued_goals();
         if *verdict == Verdict::Unsolvable && self.history.is_explaining() && !is_explained {

@@ -95,9 +95,9 @@ impl Run<'_> {
             if let Some(question) = self.agenda.question() {
                 return question.clone();
             }
-            let step = self.agenda.pop();
             work::spend(DECISION_WORK);
-            match self.perform(step) {
+            let next = self.agenda.pop();
+            match self.perform(next) {
                 Ok(Some(command)) => return Next::Command(command),
                 Ok(None) => {}
                 Err(stop) => self.begin_shutdown(stop),

@@ -80,6 +80,10 @@ pub(crate) enum Missing {
 
 /// Evaluator of states. Reuses its tables from one state to the next.
 #[derive(Debug)]
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "each is an independent setting"
+)]
 pub(crate) struct Relaxed<'a> {
     compiled: &'a Compiled,
     graph: Graph,

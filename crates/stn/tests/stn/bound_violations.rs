@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::game::{Board, Random};
-use crate::plan_networks::plan_networks;
+use crate::plan_networks::rows;
 use elbowroom_stn::uncertain::{ContingentLink, Dispatcher, LinkId, UncertainNetwork};
 use elbowroom_stn::{Constraint, Network, NodeId};
 

@@ -7,7 +7,7 @@
 )]
 
 use crate::game::{Board, Random};
-use crate::plan_networks::plan_networks;
+use crate::plan_networks::rows;
 use elbowroom_num::Rational;
 use elbowroom_stn::uncertain::{ContingentLink, Recheck, UncertainNetwork};
 use elbowroom_stn::{Constraint, Network, Weight};

@@ -93,12 +93,12 @@ pub(in crate::commands) fn of(
     } else if let Some(path) = &arguments.world {
         let source = input::source(path, "world")?;
         spec.world = Some(source.text().to_owned());
-        names.world = source.name().to_owned();
+        source.name().clone_into(&mut names.world);
     }
     if let Some(path) = &arguments.believed {
         let source = read_believed_world(path, arguments.learn.as_deref())?;
         spec.believed = Some(source.text().to_owned());
-        names.believed = source.name().to_owned();
+        source.name().clone_into(&mut names.believed);
     }
     spec.problem = problem(&spec.domain)?;
     spec.first_plan = match arguments.first_plan_by {

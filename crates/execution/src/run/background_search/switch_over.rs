@@ -16,7 +16,7 @@ impl Run<'_> {
     pub(super) fn process_found_plan(
         &mut self,
         mut search: BackgroundSearch,
-        plan: TimeTriggeredPlan,
+        plan: &TimeTriggeredPlan,
     ) -> Result<(), Stop> {
         if search.query().guess == OverrunEstimate::Cancelled {
             self.cancel_overdue(search.query().reason.clone());
@@ -24,7 +24,7 @@ impl Run<'_> {
         }
         search.set_plan(plan.clone(), &self.now);
         if search.has_abandoned_plan() {
-            return self.switch_from_empty_plan(search, &plan, true);
+            return self.switch_from_empty_plan(search, plan, true);
         }
         self.background.set_search(search);
         Ok(())

@@ -31,7 +31,7 @@ impl GoalManager<'_> {
     /// Continues with the other goals after these were achieved.
     fn continue_without(&mut self, ctx: &mut GoalContext<'_>, achieved: &[OpenGoal]) {
         self.has_closed_goals = ctx.is_searching;
-        self.record_achieved(ctx, achieved);
+        Self::record_achieved(ctx, achieved);
         self.set_goal(ctx);
         if !ctx.is_searching && self.is_selecting_goals() {
             // Without the closed goals, more sets may have a plan.
@@ -74,7 +74,7 @@ impl GoalManager<'_> {
         match names_of(&achieved) {
             Some(_) if is_any_left => self.continue_without(ctx, &achieved),
             Some(names) => {
-                self.record_achieved(ctx, &achieved);
+                Self::record_achieved(ctx, &achieved);
                 self.pursue_all(ctx);
                 self.record_change(ctx, format!("{names} is reached"), false);
             }
@@ -91,7 +91,7 @@ impl GoalManager<'_> {
         // A goal may have been achieved exactly at its deadline.
         let is_achieved = |goal: &OpenGoal| ctx.belief.is_certain(&goal.ground) == Ok(true);
         let (achieved, late): (Vec<_>, Vec<_>) = due.into_iter().partition(is_achieved);
-        self.record_achieved(ctx, &achieved);
+        Self::record_achieved(ctx, &achieved);
         for goal in &late {
             let why = match &goal.set_aside {
                 Some(aside) => format!("its deadline has passed; it was set aside: {aside}"),
@@ -134,7 +134,7 @@ impl GoalManager<'_> {
         is_unchanged
     }
 
-    pub(super) fn record_achieved(&self, ctx: &mut GoalContext<'_>, goals: &[OpenGoal]) {
+    pub(super) fn record_achieved(ctx: &mut GoalContext<'_>, goals: &[OpenGoal]) {
         for goal in goals {
             ctx.recorder.record(&Entry::Goal {
                 now: ctx.now,

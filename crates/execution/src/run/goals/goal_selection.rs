@@ -170,7 +170,7 @@ impl GoalManager<'_> {
         let (achieved, left) = self.goals.drain(..).partition(OpenGoal::is_pursued);
         self.goals = left;
         let achieved = self.keep_achieved(achieved);
-        self.record_achieved(ctx, &achieved);
+        Self::record_achieved(ctx, &achieved);
         self.pursue_all(ctx);
         self.announce_goals(ctx);
         self.set_goal(ctx);
@@ -251,7 +251,7 @@ impl GoalManager<'_> {
         self.pursue_all(ctx);
         self.record_unreachable_goals(ctx);
         let mut others = Vec::new();
-        for goal in self.goals.iter_mut() {
+        for goal in &mut self.goals {
             goal.set_aside.clone_from(&goal.unreachable);
             if goal.is_pursued() {
                 others.push(&*goal);

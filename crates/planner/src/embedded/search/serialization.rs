@@ -16,16 +16,19 @@ use super::Search;
 use super::goals::conjuncts;
 use super::node;
 
+/// A set of conjuncts of the goal, one bit for each.
+type Conjuncts = Box<[u64]>;
+
 /// The subgoal of a part of a path.
 #[derive(Debug, PartialEq, Eq, Hash)]
 pub(super) struct Agenda {
     /// The conjuncts of the goal that are kept, as a bit set.
-    kept: Box<[u64]>,
+    kept: Conjuncts,
     /// The conjuncts of which one is to be achieved, as a bit set.
-    candidates: Box<[u64]>,
+    candidates: Conjuncts,
     /// The conjuncts that a relaxed plan made false on the path so far, as a bit set. They come
     /// last.
-    postponed: Box<[u64]>,
+    postponed: Conjuncts,
     subgoal: Subgoal,
     /// `true` if the relaxed plan for the whole goal overdraws a consumable at the beginning of
     /// this part.
@@ -110,7 +113,7 @@ impl Search<'_> {
     fn next_agenda(
         &mut self,
         state: &State,
-        known: Option<(Box<[u64]>, Box<[u64]>)>,
+        known: Option<(Conjuncts, Conjuncts)>,
         whole: &Estimate,
     ) -> Agenda {
         let (late_operators, costs) = self.relaxed.lateness(state, self.strategy.spreads_work);
