@@ -60,8 +60,8 @@ impl Executor for Drill {
         self.inner.window(step, is_end)
     }
 
-    fn bears_until(&self, step: StepId, now: &Rational) -> Option<Rational> {
-        self.inner.bears_until(step, now)
+    fn latest_tolerated_end(&self, step: StepId, now: &Rational) -> Option<Rational> {
+        self.inner.latest_tolerated_end(step, now)
     }
 
     fn fork(&self) -> Option<Box<dyn Executor>> {

@@ -662,7 +662,7 @@ fn document_lists_every_test() {
     let tests = own.split("#[test]\nfn ").skip(1);
     let tests = tests.filter_map(|text| text.split('(').next());
     let mut tests: Vec<&str> = tests
-        .filter(|name| !name.starts_with("the_page_has"))
+        .filter(|name| **name != *"document_lists_every_test")
         .collect();
     let rows = page
         .lines()

@@ -197,7 +197,7 @@ fn inconsistent_settings_are_rejected_before_the_run() {
     assert!(matches!(wrong, Some(SpecError::NeedsWorld(_))), "{wrong:?}");
     let wrong = check(&|spec| {
         spec.executor = live();
-        spec.world = Some(String::new());
+        spec.world = Some("format = \"elbowroom-world\"\nversion = 1\n".to_owned());
         spec.planner = "none".to_owned();
     });
     assert!(
