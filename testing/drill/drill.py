@@ -127,8 +127,8 @@ def command() -> None:
 
     check("drill\n      Tests the registry" in output("run", "--help"), "the help of `run`")
     check("`drill` by default" in " ".join(output("odds", "--help").split()), "the help of `odds`")
-    check("drill" in output("run", "a", "b", "--executor", "dril").split("choose one of")[-1], "the list of a wrong name")
     problem = (weld / "domain.pddl", weld / "problem.pddl", plan)
+    check("drill" in output("run", *problem[:2], "--executor", "dril").split("choose one of")[-1], "the list of a wrong name")
 
     def reasons(executor: str, world: Path) -> str:
         trace = folder / "trace.jsonl"

@@ -23,7 +23,7 @@
 //! | feedback | if the completion has grown, the time-out counts from then on |
 //! | a report that cannot be read, or names an object that the problem does not have | recorded and ignored |
 //! | endless answers while the clock stands still or hardly advances | the world is broken ([`Verdict::WorldFailed`]) |
-//! | no report at all | a warning ([`Entry::Warning`]), and at its time-out ([`TimeoutRule`]) the action is cancelled and counts as failed. If the slack of running actions is monitored ([`RunSettings::monitors_slack`]), the same applies to an action whose delay no plan tolerates any more |
+//! | no report at all | a warning ([`Entry::Warning`](crate::record::Entry::Warning)), and at its time-out ([`TimeoutRule`]) the action is cancelled and counts as failed. If the slack of running actions is monitored ([`RunSettings::monitors_slack`]), the same applies to an action whose delay no plan tolerates any more |
 //! | a fact or value other than believed | believed; the executor is notified, and simulates the remaining plan |
 //!
 //! A run can also continue after its goal is reached ([`Run::persistent`]): goals are added and

@@ -20,7 +20,7 @@ pub struct Settings {
     /// better than the best, but its bound needs fewer states.
     pub plans: Vec<Vec<String>>,
     /// Further sets of actions: those of new plans after a failure of one of the
-    /// [plans](Self::plans), with the supporting actions of that plan ([`supported`]). They are
+    /// [plans](Self::plans), with the supporting actions of that plan ([`supported`](crate::supported)). They are
     /// used only if everything happens at known times, after the plans.
     pub fallbacks: Vec<Vec<String>>,
 }

@@ -21,27 +21,27 @@ use crate::request::{PlanRequest, PrepareRequest, RequestId};
 /// The next request of a run to its driver.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Next {
-    /// Send this command to the world; then [`Run::next`] again.
+    /// Send this command to the world; then [`Run::next`](crate::run::Run::next) again.
     Command(Command),
-    /// Wait for an observation, at most until `until`; then [`Run::observe`].
+    /// Wait for an observation, at most until `until`; then [`Run::observe`](crate::run::Run::observe).
     Wait {
         /// On the world's clock.
         until: Rational,
     },
-    /// Look at these facts and fluents in the world, if possible; then [`Run::observe_requested`].
+    /// Look at these facts and fluents in the world, if possible; then [`Run::observe_requested`](crate::run::Run::observe_requested).
     Look {
         /// Facts.
         facts: Vec<FactId>,
         /// Fluents.
         fluents: Vec<FluentId>,
     },
-    /// Make a plan; then [`Run::planned`]. If the run waits for it
+    /// Make a plan; then [`Run::planned`](crate::run::Run::planned). If the run waits for it
     /// ([`Urgency::Awaited`](crate::Urgency::Awaited)), the request is repeated until then;
-    /// otherwise [`Run::next`] again.
+    /// otherwise [`Run::next`](crate::run::Run::next) again.
     Plan(PlanRequest),
-    /// Prepare a plan for the executor; then [`Run::prepared`], likewise.
+    /// Prepare a plan for the executor; then [`Run::prepared`](crate::run::Run::prepared), likewise.
     Prepare(PrepareRequest),
-    /// Abandon this request, whose answer is not needed any more; then [`Run::next`] again.
+    /// Abandon this request, whose answer is not needed any more; then [`Run::next`](crate::run::Run::next) again.
     Abandon(RequestId),
     /// The run is over.
     Over(Report),

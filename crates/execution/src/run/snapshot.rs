@@ -22,7 +22,7 @@ pub struct RunSnapshot {
     /// Expected planning time, in seconds of the world's clock.
     pub allowance: Rational,
     /// The time from when answers of the world are counted, and their number, to detect a clock
-    /// that stands still ([`Verdict::WorldFailed`]).
+    /// that stands still ([`Verdict::WorldFailed`](crate::run::Verdict::WorldFailed)).
     pub answers: (Rational, usize),
     /// Number of new plans since the run was last idle.
     pub replans: usize,
