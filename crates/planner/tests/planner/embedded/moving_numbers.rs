@@ -9,7 +9,7 @@ use elbowroom_planner::{Answer, Settings, plan};
 use crate::embedded::world::{describe, task};
 
 /// Maximum number of states per problem.
-const STATES: u64 = 100;
+const STATES: u64 = 200;
 
 fn answered(task: &Task) -> Answer {
     let settings = Settings {
