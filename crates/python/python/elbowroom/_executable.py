@@ -12,6 +12,7 @@ from . import _native
 from ._answers import Run
 from ._errors import InterruptedWarning
 from ._execution import Stepped
+from ._native import DEFAULT_EXECUTOR
 from ._runs import RunRequest, run_options
 from ._stepped import SteppedWorld
 from ._stop import Stop
@@ -33,7 +34,7 @@ class Executable:
         plan: AnyPlan | None = None,
         *,
         world: World | SteppedWorld | Text | None = None,
-        executor: str = _native.DEFAULT_EXECUTOR,
+        executor: str = DEFAULT_EXECUTOR,
         planner: str | PlannerCallable = "embedded",
         seed: int = 0,
         trace: bool = True,
@@ -99,7 +100,7 @@ class Executable:
         self,
         plan: AnyPlan | None = None,
         *,
-        executor: str = _native.DEFAULT_EXECUTOR,
+        executor: str = DEFAULT_EXECUTOR,
         planner: str | PlannerCallable = "embedded",
         trace: bool = True,
         **options: Any,
