@@ -182,7 +182,7 @@ impl BackgroundPlanning {
         self.anticipated.take_if(|it| it.is_after(now));
     }
 
-    /// Abandons the present plan, of which these steps were started.
+    /// Abandons the present plan. These of its steps were started.
     pub(super) fn abandon_plan(&mut self, started: &BTreeMap<StepId, ActionHandle>) {
         if let Some(search) = &mut self.search {
             search.abandon_plan(started);

@@ -104,7 +104,7 @@ pub(crate) struct Relaxed<'a> {
     is_wanted: Vec<bool>,
     gaps: Vec<f64>,
     buckets: Vec<Vec<u32>>,
-    /// The cost up to which costs were propagated.
+    /// The largest cost that propagation has reached.
     propagated_cost: usize,
     applicable: Vec<u32>,
     deadlines: Deadlines,

@@ -206,7 +206,7 @@ impl BackgroundSearch {
         matches!(&self.execution, ExecutionDuringSearch::PlanContinues { until: Some(until) } if now >= until)
     }
 
-    /// Abandons the present plan, of which these steps were started.
+    /// Abandons the present plan. These of its steps were started.
     pub(super) fn abandon_plan(&mut self, started: &BTreeMap<StepId, ActionHandle>) {
         if !self.has_abandoned_plan() {
             self.abandoned_steps.clone_from(started);

@@ -13,7 +13,7 @@ const MAX_LATENESS: Ticks = 7;
 pub(crate) struct Subgoal {
     /// The goals that must hold.
     pub(crate) kept: Box<[u32]>,
-    /// The goals one of which must hold.
+    /// Alternative goals: at least one must hold.
     pub(crate) candidates: Box<[u32]>,
     /// The operators that are too late.
     pub(crate) late_operators: Box<[u32]>,

@@ -24,7 +24,7 @@ type Conjuncts = Box<[u64]>;
 pub(super) struct Agenda {
     /// The conjuncts of the goal that are kept, as a bit set.
     kept: Conjuncts,
-    /// The conjuncts of which one is to be achieved, as a bit set.
+    /// The conjuncts that may be achieved next, as a bit set.
     candidates: Conjuncts,
     /// The conjuncts that a relaxed plan made false on the path so far, as a bit set. They come
     /// last.
