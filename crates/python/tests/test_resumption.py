@@ -41,13 +41,14 @@ CRASH = """
 from test_resumption import *
 executive = Executive(*CASE, world=Lasting(), journal=sys.argv[1])
 executive.wait("problem", HANG)
+# Before the goals, so that no action for them has started.
+if sys.argv[2] == "paused":
+    executive.pause()
 executive.submit(HOME)
 executive.submit("(at rover shelf)", name="shelf")
 if sys.argv[2] == "running":
     while not executive.status().running:
         time.sleep(0.001)
-else:
-    executive.pause()
 os.kill(os.getpid(), signal.SIGKILL)
 """
 
