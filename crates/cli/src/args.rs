@@ -31,7 +31,7 @@ use number::{positive, positive_or_zero};
 pub(crate) use odds::OddsArgs;
 pub(crate) use plan::{EMBEDDED, PlanArgs};
 pub(crate) use run::{FirstPlanChoice, RunArgs, RunningChoice};
-pub(crate) use serve::{CtlArgs, CtlCommand, ServeArgs};
+pub(crate) use serve::{CtlArgs, CtlCommand, GoalTerms, ServeArgs};
 pub(crate) use world_check::WorldCheckArgs;
 
 use crate::terminal;

@@ -101,6 +101,8 @@ pub enum Entry<'a> {
         command: &'a Command,
         /// The planned window.
         planned: &'a Planned,
+        /// The duration of an action in the plan, where it differs from that of the command.
+        expected: Option<&'a Rational>,
         /// The time-out of an action that is started; `None` if time-outs are off.
         timeout: Option<&'a Rational>,
     },

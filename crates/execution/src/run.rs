@@ -84,6 +84,7 @@ mod better_plan;
 mod clock_watchdog;
 mod closing;
 mod decisions;
+mod domain_commands;
 mod doubts;
 mod goals;
 mod history;
@@ -156,6 +157,8 @@ pub struct Ports<'a> {
 /// and decisions between the parts.
 pub struct Run<'a> {
     task: Arc<Task>,
+    /// The task with the durations of commands, if they differ from those of plans.
+    domain: Option<Arc<Task>>,
     ports: Ports<'a>,
     settings: RunSettings,
     now: Rational,
@@ -218,6 +221,7 @@ impl<'a> Run<'a> {
             history: History::new(belief.clone()),
             belief,
             task,
+            domain: None,
             ports,
             settings,
             now: Rational::ZERO,

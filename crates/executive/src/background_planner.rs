@@ -7,6 +7,7 @@ use elbowroom::execution::{PlanAnswer, Planner, PlannerAnswer};
 use elbowroom::model::problem::Condition;
 use elbowroom::model::{Situation, Step, Task, TimeTriggeredPlan};
 use elbowroom::num::work::Stop;
+use elbowroom::report::trace::action_named;
 
 use crate::background_task::BackgroundTask;
 use crate::clock::Clock;
@@ -180,17 +181,12 @@ fn renumbered(
     task: &Task,
     situation: &Situation,
 ) -> Option<TimeTriggeredPlan> {
-    let problem = task.problem();
     let numbered = plan.steps.iter().enumerate();
     let steps = numbered.map(|(index, step)| {
         let action = if let Some(running) = situation.running.get(index) {
             Arc::clone(&running.action)
         } else {
-            let name = step.action.name.trim_matches(['(', ')']);
-            let mut words = name.split_whitespace();
-            let schema = problem.schema(words.next()?)?;
-            let objects: Option<Vec<_>> = words.map(|word| problem.object(word)).collect();
-            Arc::new(task.instantiate(schema, &objects?).ok()?)
+            Arc::new(action_named(&step.action.name, task).ok()?)
         };
         Some(Step {
             action,

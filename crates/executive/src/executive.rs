@@ -21,7 +21,7 @@ use crate::embedded_world::EmbeddedWorld;
 use crate::error::{Error, WarningSink};
 use crate::goal_request::GoalNames;
 use crate::interface::Status;
-use crate::interface::documents::{NewGoal, State};
+use crate::interface::documents::{NewGoal, State, WhatIf};
 use crate::journal::{JournalFile, Segments};
 use crate::learning::{Learner, Learning};
 use crate::messages::io_error_message;
@@ -32,6 +32,7 @@ use crate::request_queue::{ExternalRequest, RequestQueue, RequestStatus};
 use crate::resume::{InterruptedRun, JournaledRun, ResumeSettings};
 use crate::run::{JournaledOutcome, RunAssembly, RunError, RunHost};
 use crate::trace_buffer::TraceBuffer;
+use crate::what_if::what_if;
 
 /// Settings of an executive that its specification does not contain.
 #[derive(Clone, Debug)]
@@ -221,6 +222,14 @@ impl Executive {
         Ok((name, status))
     }
 
+    /// Returns the outcome of a goal if it were given now and everything went as planned. The run does not change.
+    ///
+    /// # Errors
+    /// When the goal is invalid, or the run has not begun.
+    pub fn what_if(&self, goal: NewGoal) -> Result<WhatIf, Error> {
+        what_if(&self.inputs, &self.status, goal)
+    }
+
     /// Returns `true` if the run has accepted all submitted requests.
     pub fn is_idle(&self) -> bool {
         self.queue.is_idle()
@@ -377,8 +386,8 @@ fn finish_learning<T>(learning: Option<Learning>, outcome: T) -> T {
 }
 
 impl RunHost for Executive {
-    fn operator(&self, spec: &RunSpec, _: &Arc<Task>) -> Result<OperatorInterface, Error> {
-        if !spec.is_persistent {
+    fn operator(&self, inputs: &RunInputs) -> Result<OperatorInterface, Error> {
+        if !inputs.spec().is_persistent {
             return Err(Error::new(
                 "this is the journal of a run that ends with its goal",
                 "resume it with `elbowroom run --resume`",

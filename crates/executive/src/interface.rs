@@ -12,4 +12,5 @@ mod status;
 
 pub use openapi::{METHODS, Method, openapi};
 pub use schema::Described;
+pub(crate) use status::SegmentHistory;
 pub use status::{Status, goal_text};

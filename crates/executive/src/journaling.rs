@@ -99,8 +99,9 @@ impl Recorder for JournalWriter<'_> {
     fn begin_anew(&mut self, stand: &dyn Fn() -> RunSnapshot) -> bool {
         self.file.needs_rotation()
             && SnapshotLine::of(&self.task, &stand()).is_some_and(|mut snapshot| {
-                let closed = self.status.as_ref().map(Status::closed_goals);
-                snapshot.closed = closed.unwrap_or_default();
+                if let Some(status) = &self.status {
+                    status.complete(&mut snapshot);
+                }
                 self.file.rotate(&snapshot_text(&snapshot))
             })
     }

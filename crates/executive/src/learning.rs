@@ -28,7 +28,7 @@ pub const MODEL: &str = "world.toml";
 const MIN_UPDATE_INTERVAL: Duration = Duration::from_secs(10);
 
 /// File name extension of the logs in the folder.
-const LOG: &str = "journal";
+pub(crate) const LOG: &str = "journal";
 
 /// Folder of logs with the model learnt from them.
 pub struct Learner {

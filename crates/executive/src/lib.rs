@@ -18,6 +18,7 @@
 //!   the buffer of the trace for clients.
 //! - [`interface`]: the requests and responses of an executive as types, its `OpenAPI` document, and the state of a
 //!   run for clients.
+//! - [`history`]: closed goals and ended actions from the segments of a journal.
 //! - [`clock`], [`memory_limit`], [`messages`]: wall clock, memory limit, texts of messages.
 //!
 //! This crate makes threads, reads clocks and writes files. It prints nothing: warnings go to a
@@ -35,6 +36,7 @@ mod embedded_world;
 mod error;
 mod executive;
 mod goal_request;
+pub mod history;
 pub mod http;
 pub mod interface;
 pub mod journal;
@@ -52,6 +54,7 @@ pub mod resume;
 pub mod run;
 mod running_actions;
 pub mod trace_buffer;
+mod what_if;
 pub mod world_check;
 mod world_connection;
 pub mod world_protocol;

@@ -58,6 +58,48 @@ pub enum ExternalRequest {
     },
 }
 
+impl ExternalRequest {
+    /// Returns the request as an event at `now`; `None` if the task does not have its fact or fluent.
+    pub(crate) fn event(self, now: &Rational, task: &Task) -> Option<Event> {
+        match self {
+            Self::Request(request) => Some(Event::Requested(request)),
+            Self::TimedGoal {
+                name,
+                goal,
+                terms,
+                within,
+                after,
+            } => Some(Event::Requested(Request::Pursue {
+                name,
+                goal,
+                terms: GoalTerms {
+                    deadline: within.map(|it| now + &it).or(terms.deadline),
+                    release: after.map(|it| now + &it).or(terms.release),
+                    ..terms
+                },
+            })),
+            Self::Fact { fact, becomes } => Some(Event::Fact {
+                fact: task.fact_named(&fact)?,
+                truth: becomes,
+            }),
+            Self::Outcome { ticket, succeeded } => Some(Event::Ended {
+                ticket,
+                ending: if succeeded {
+                    Ending::Succeeded
+                } else {
+                    let why = "an operator has reported it as failed".to_owned();
+                    Ending::Failed { why }
+                },
+                measured: Vec::new(),
+            }),
+            Self::Number { fluent, value } => Some(Event::Value {
+                fluent: task.fluent_named(&fluent)?,
+                value,
+            }),
+        }
+    }
+}
+
 /// Bounded queue of requests. Clones share the same queue.
 #[derive(Clone, Default)]
 pub struct RequestQueue(Arc<Inner>);
@@ -170,42 +212,9 @@ impl RequestQueue {
             state.fetched = state.submitted;
             std::mem::take(&mut state.waiting)
         };
-        let events = requests.into_iter().filter_map(|request| match request {
-            ExternalRequest::Request(request) => Some(Event::Requested(request)),
-            ExternalRequest::TimedGoal {
-                name,
-                goal,
-                terms,
-                within,
-                after,
-            } => Some(Event::Requested(Request::Pursue {
-                name,
-                goal,
-                terms: GoalTerms {
-                    deadline: within.map(|it| now + &it).or(terms.deadline),
-                    release: after.map(|it| now + &it).or(terms.release),
-                    ..terms
-                },
-            })),
-            ExternalRequest::Fact { fact, becomes } => Some(Event::Fact {
-                fact: task.fact_named(&fact)?,
-                truth: becomes,
-            }),
-            ExternalRequest::Outcome { ticket, succeeded } => Some(Event::Ended {
-                ticket,
-                ending: if succeeded {
-                    Ending::Succeeded
-                } else {
-                    let why = "an operator has reported it as failed".to_owned();
-                    Ending::Failed { why }
-                },
-                measured: Vec::new(),
-            }),
-            ExternalRequest::Number { fluent, value } => Some(Event::Value {
-                fluent: task.fluent_named(&fluent)?,
-                value,
-            }),
-        });
+        let events = requests
+            .into_iter()
+            .filter_map(|request| request.event(now, task));
         let time = now.clone();
         events
             .map(|event| Observation {

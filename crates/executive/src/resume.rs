@@ -219,7 +219,7 @@ impl InterruptedRun {
         let first = first.transpose().map_err(|error| wrong(&error))?.flatten();
         let file = file.map_or_else(|| JournalFile::reopen(&path, &journal, length), Ok)?;
         let mut file = file.with_rotation(host.segments(), &warnings);
-        let operator = host.operator(spec, task)?;
+        let operator = host.operator(inputs)?;
         if let Some(snapshot) = &snapshot {
             operator.begin_at(snapshot);
         }

@@ -36,8 +36,8 @@ pub trait RunHost {
     ///
     /// # Errors
     /// When the host does not support such a run.
-    fn operator(&self, spec: &RunSpec, task: &Arc<Task>) -> Result<OperatorInterface, Error> {
-        let _ = (spec, task);
+    fn operator(&self, inputs: &RunInputs) -> Result<OperatorInterface, Error> {
+        let _ = inputs;
         Ok(OperatorInterface::default())
     }
 

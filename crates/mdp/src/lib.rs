@@ -125,20 +125,19 @@ pub fn optimum(
         }
         if found.is_bounded() {
             // A finer grid would not reduce the remaining difference.
-            known.stop = Stop::TooManyStates;
+            known.stop = Stop::FinestGrid;
             known.within = search.best.filter(|best| best.lower >= known.lower);
             return Ok(known);
         }
     }
     let mut found = refine_bounds(&world, known, settings, &|_| true, may_continue)?;
-    if found.stop == Stop::TooManyStates
-        && let Some(kinder) = world.without_uncertain_harm()
-    {
+    let is_limited = matches!(found.stop, Stop::TooManyStates | Stop::FinestGrid);
+    if is_limited && let Some(kinder) = world.without_uncertain_harm() {
         let cells = settings.first_cells.max(1) << found.grids.len();
         let upper = relaxed_world::bound_from(&kinder, cells, found.lower, settings, may_continue)?;
         found.upper = found.upper.min(upper);
     }
-    if found.upper - found.lower > settings.gap && found.stop == Stop::TooManyStates {
+    if found.upper - found.lower > settings.gap && is_limited {
         search.refine(found.upper, settings.most_states, settings, may_continue);
     }
     if let Some(best) = search.best

@@ -67,7 +67,7 @@ pub(super) fn refine_bounds(
             return Ok(answer);
         }
         if !is_promising(&answer.grids) {
-            answer.stop = Stop::TooManyStates;
+            answer.stop = Stop::NotPromising;
             return Ok(answer);
         }
         cells *= 2;
@@ -81,7 +81,7 @@ pub(super) fn grid(
     may_continue: &dyn Fn() -> bool,
 ) -> Result<Result<Grid, Stop>, NotTabulated> {
     if cells >= usize::from(u16::MAX) {
-        return Ok(Err(Stop::TooManyStates));
+        return Ok(Err(Stop::FinestGrid));
     }
     let mut left = settings.most_states;
     // The lower bound first, because it detects sooner that there are too many states.

@@ -48,6 +48,10 @@ pub enum Stop {
     Close,
     /// The next grid has too many states.
     TooManyStates,
+    /// No finer grid is supported, or would bring the bounds closer.
+    FinestGrid,
+    /// The bounds are not expected to become close within the limits.
+    NotPromising,
     /// The caller stopped it.
     Interrupted,
 }

@@ -103,7 +103,9 @@ impl<'a> Grounder<'a> {
         let problem = self.problem;
         let mut binding = arguments.to_vec();
         let binding = &mut binding;
-        let body = match &problem.schemas[schema.index()].body {
+        let lifted = &problem.schemas[schema.index()];
+        let name = problem.apply_name(&lifted.name, arguments);
+        let body = match &lifted.body {
             Body::Instantaneous { condition, effects } => {
                 ground::Body::Instantaneous(self.ground_snap(condition, effects, binding, known))
             }
@@ -131,13 +133,17 @@ impl<'a> Grounder<'a> {
                 is_running: false,
             }),
         };
-        let name = problem.apply_name(&problem.schemas[schema.index()].name, arguments);
-        ground::Action {
+        let rule = problem.expected_durations.rule(schema, lifted, &name);
+        let mut action = ground::Action {
             schema,
             arguments: arguments.to_vec(),
             name,
             body,
+        };
+        if let Some(expected) = rule {
+            expected.apply(&mut action);
         }
+        action
     }
 
     fn ground_snap(

@@ -3,9 +3,11 @@
 //! Variables are numbered by position: an action's parameters come first, then the variables of
 //! each enclosing quantifier, outermost first. A [`Term::Variable`] is an index into that list.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use elbowroom_num::Rational;
+
+use crate::pattern::ActionPattern;
 
 pub use crate::autonomous::{Event, Process};
 pub use crate::constraint::{ActionPreference, Constraint, Modal};
@@ -115,6 +117,31 @@ pub struct Problem {
     pub action_preferences: Vec<ActionPreference>,
     /// The metric to optimize. It has no influence on validity.
     pub metric: Option<Metric>,
+    /// Expected durations in place of those that the domain fixes; none in a problem as written.
+    pub expected_durations: ExpectedDurations,
+}
+
+/// The rules for expected durations. The last rule that matches an action applies.
+///
+/// They concern actions whose duration the domain fixes by a single `(= ?duration …)` at the start, and that do not
+/// read it before their end. A range of durations is a constraint, from which plans choose, so it stays as it is.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ExpectedDurations {
+    /// The rules.
+    pub rules: Vec<ExpectedDuration>,
+    /// The schemas whose duration bounds already have the expected values.
+    pub is_included: BTreeSet<SchemaId>,
+}
+
+/// An expected duration: a multiple of the domain's duration, plus a number of seconds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExpectedDuration {
+    /// The actions.
+    pub actions: ActionPattern,
+    /// The multiple of the domain's duration; not negative.
+    pub factor: Rational,
+    /// The added number of seconds; not negative.
+    pub seconds: Rational,
 }
 
 /// A type and its direct supertypes (none for `object`; several for `either`).

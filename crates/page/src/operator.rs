@@ -11,6 +11,7 @@ const SCRIPTS: &[&str] = &[
     include_str!("operator/goals.js"),
     include_str!("operator/lanes.js"),
     include_str!("operator/slack.js"),
+    include_str!("operator/history.js"),
     include_str!("operator/page.js"),
 ];
 

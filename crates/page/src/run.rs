@@ -10,11 +10,10 @@ use std::sync::Arc;
 use elbowroom::answers::RunAnswer;
 use elbowroom::answers::envelope::timeline;
 use elbowroom::answers::learn::{PredictionAnswer, predictions_for};
-use elbowroom::execute::RunSpec;
+use elbowroom::execute::{RunInputs, RunSpec};
 use elbowroom::learning::records;
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
-use elbowroom::pddl;
 use elbowroom::report::decimal::nearest;
 use elbowroom::report::schema::{ObservationLine, ReasonLine, ReportLine};
 use elbowroom::report::trace::{Line, Stored};
@@ -48,7 +47,7 @@ pub(crate) enum Record {
 #[allow(clippy::too_many_lines, reason = "the page from top to bottom")]
 pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec, record: Record) -> Document {
     let mut texts = Texts::default();
-    let task = task(spec).map(Arc::new);
+    let task = task(spec);
     let left_out = match record {
         Record::Live { left_out } => left_out,
         Record::Ended => 0,
@@ -253,10 +252,9 @@ pub(crate) fn outcome(answer: &RunAnswer) -> Document {
     }
 }
 
-fn task(spec: &RunSpec) -> Option<Task> {
-    let read = pddl::read_problem(&spec.domain.source(), &spec.problem.source());
-    let (problem, _warnings) = read.ok()?;
-    Some(Task::new(problem).with_epsilon(spec.epsilon.clone()))
+fn task(spec: &RunSpec) -> Option<Arc<Task>> {
+    let (inputs, _warnings) = RunInputs::read(spec.clone()).ok()?;
+    Some(Arc::clone(inputs.task()))
 }
 
 fn verdict(report: &ReportLine) -> Verdict {

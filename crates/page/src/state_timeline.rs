@@ -9,10 +9,11 @@ use std::sync::Arc;
 use elbowroom::answers::Exact;
 use elbowroom::execution::{ActionHandle, BeliefState, Measured};
 use elbowroom::model::Task;
-use elbowroom::model::ground::{Action, FactId, FluentId};
+use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
 use elbowroom::report::decimal::nearest;
 use elbowroom::report::schema::ObservationLine;
+use elbowroom::report::trace::action_named;
 
 use crate::document::{Change, SeriesLine, Texts};
 use limits::{LimitPeriod, NumericLimits};
@@ -83,7 +84,7 @@ impl<'t> StateTimeline<'t> {
         let ObservationLine::Started { measured, time, .. } = observation else {
             return;
         };
-        let Some(action) = instantiate(self.task, action) else {
+        let Ok(action) = action_named(action, self.task) else {
             return;
         };
         self.advance(&time.0, texts);
@@ -263,11 +264,4 @@ fn line(name: String, points: &[(Rational, Rational)]) -> SeriesLine {
         limits: Vec::new(),
         closest: None,
     }
-}
-
-fn instantiate(task: &Task, name: &str) -> Option<Action> {
-    let mut words = name.trim_matches(['(', ')']).split_whitespace();
-    let schema = task.problem().schema(words.next()?)?;
-    let objects: Option<Vec<_>> = words.map(|word| task.problem().object(word)).collect();
-    task.instantiate(schema, &objects?).ok()
 }

@@ -48,7 +48,7 @@ impl Executive {
         warn: Py<PyAny>,
     ) -> PyResult<Self> {
         run_without_gil(py, || {
-            let spec = problem.specification(options, false)?;
+            let spec = problem.specification(options, false, false)?;
             let settings = ExecutiveSettings {
                 journal,
                 ..settings(learn, segments, planner_memory, warn)
@@ -147,6 +147,14 @@ impl Executive {
             let submitted = self.inner.submit_goal(goal, duration(timeout)?);
             let (name, status) = submitted.map_err(refused)?;
             Ok((name, status_name(status)))
+        })
+    }
+
+    /// Returns the predicted outcome of a goal. Goal and answer are JSON documents.
+    fn what_if(&self, py: Python<'_>, goal: &str) -> PyResult<String> {
+        run_without_gil(py, || {
+            let goal: NewGoal = serde_json::from_str(goal).map_err(CallError::request)?;
+            Ok(json(&self.inner.what_if(goal).map_err(refused)?))
         })
     }
 

@@ -55,7 +55,7 @@ pub(crate) fn run(
     stop: &Stop,
 ) -> PyResult<(String, Option<String>, bool, Option<Py<PyAny>>)> {
     let (answer, trace, is_interrupted, raised) = run_without_gil(py, || {
-        let spec = problem.specification(options, plan.is_some())?;
+        let spec = problem.specification(options, plan.is_some(), planner.is_some())?;
         let watch =
             ProgressObserver::start(time_limit, progress).with_stop_flag(Arc::clone(&stop.flag));
         let raised = Raised::default();
@@ -132,6 +132,7 @@ impl Task {
         &self,
         options: &str,
         has_plan: bool,
+        has_planner: bool,
     ) -> Result<RunSpec, CallError> {
         let usual = RunSpec {
             has_plan,
@@ -154,6 +155,7 @@ impl Task {
             serde_json::from_value(members.into()).map_err(CallError::request)?;
         check_vary(&self.task, &spec.vary).map_err(CallError::request)?;
         spec.check_planner()?;
+        spec.plans_believed_durations = !has_planner && spec.usual_durations();
         spec.threads = threads(jobs, 1, spec.planner.eq_ignore_ascii_case(EMBEDDED))?;
         Ok(spec)
     }

@@ -56,7 +56,7 @@ impl Stepper {
         has_trace: bool,
     ) -> PyResult<Self> {
         run_without_gil(py, || {
-            let spec = problem.specification(options, plan.is_some())?;
+            let spec = problem.specification(options, plan.is_some(), planner.is_some())?;
             let task = problem.with_epsilon_of(&spec);
             let first = plan.map(|plan| problem.time_triggered(plan)).transpose()?;
             let raised = Raised::default();

@@ -79,6 +79,10 @@ def test_goals_are_reached_and_listed() -> None:
     world = Depot()
     with Executive(*CASE, world=world) as executive:
         assert executive.wait("problem", HANG)
+        what = executive.what_if(HOME, within=1000)
+        assert what.verdict == "achieved" and what.done is not None and what.missed == []
+        with pytest.raises(elbowroom.RequestError):
+            executive.what_if("(at rover nowhere)")
         home = executive.submit(HOME, value=2)
         found = executive.wait(home, HANG)
         assert found and (found.name, found.goal, found.value) == (home, HOME, 2)

@@ -242,6 +242,9 @@ pub struct CommandLine {
     pub command: IssuedCommandLine,
     /// Planned time window of the command.
     pub planned: WindowLine,
+    /// The duration that the plan expects; left out if it is that of the command.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub expected: Option<Exact>,
     /// The time-out of an action that is started, in seconds from its start or its last progress;
     /// left out if time-outs are off.
     #[serde(default, skip_serializing_if = "Option::is_none")]

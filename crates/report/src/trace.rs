@@ -18,6 +18,7 @@ use serde::Serialize;
 pub use crate::schema::{self, Line};
 pub use replay::{
     Difference, Replay, ReplayPlanner, ReplayPreparer, ReplayWorld, Stored, TraceError,
+    action_named,
 };
 pub use snapshot::{
     ClosedGoalLine, GoalLine, NewsLine, PendingGoalChangeLine, PlanAdoptionLine, RunningActionLine,

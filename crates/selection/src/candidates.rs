@@ -33,10 +33,11 @@ use elbowroom_sim::WorldModel;
 use elbowroom_stn::{ConsistentNetwork, NodeId};
 
 use crate::renumbering::renumbered;
+use crate::rewrite::fixed_duration;
 use scarcity::scarcities;
 
 pub use variant::Pace;
-use variant::{Variant, duration_fixed_by_domain, to_millionths};
+use variant::{Variant, to_millionths};
 
 /// Refinements that are disabled in searches for plans to choose from.
 const DISABLED_REFINEMENTS: [embedded::Technique; 2] = [
@@ -355,7 +356,7 @@ impl<'a> Candidates<'a> {
         for step in &plan.steps {
             let arguments = &step.action.arguments;
             let action = self.task.instantiate(step.action.schema, arguments).ok()?;
-            let planned = duration_fixed_by_domain(&action).or_else(|| step.duration.clone());
+            let planned = fixed_duration(&action).or_else(|| step.duration.clone());
             steps.push(Step {
                 start: step.start.clone(),
                 duration: step.duration.as_ref().and(planned),

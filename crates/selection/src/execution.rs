@@ -109,6 +109,10 @@ pub fn execute(
 /// # }
 /// ```
 #[must_use = "it does nothing until it is run"]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is a setting of its own"
+)]
 pub struct Execution<'a> {
     task: Arc<Task>,
     plan: Option<TimeTriggeredPlan>,
@@ -130,6 +134,7 @@ pub struct Execution<'a> {
     is_explaining: bool,
     is_persistent: bool,
     is_interactive: bool,
+    has_domain_commands: bool,
     listener: Option<Listener<'a>>,
 }
 
@@ -177,6 +182,7 @@ impl<'a> Execution<'a> {
             is_explaining: false,
             is_persistent: false,
             is_interactive: false,
+            has_domain_commands: false,
             listener: None,
         }
     }
@@ -360,6 +366,14 @@ impl<'a> Execution<'a> {
         }
     }
 
+    /// Gives commands the durations of the domain, where plans have other ones: see [`Run::with_domain_commands`].
+    pub fn with_domain_commands(self, has_domain_commands: bool) -> Self {
+        Self {
+            has_domain_commands,
+            ..self
+        }
+    }
+
     /// See [`Run::on_belief`].
     pub fn on_belief(self, listener: impl FnMut(&BeliefState) + Send + 'a) -> Self {
         let listener: Option<Listener<'a>> = Some(Box::new(listener));
@@ -404,6 +418,9 @@ impl<'a> Execution<'a> {
         let mut run = Run::new(self.task, self.plan, self.settings, ports)
             .with_stop_check(self.stop_check)
             .with_restarts(self.restarts);
+        if self.has_domain_commands {
+            run = run.with_domain_commands();
+        }
         if self.is_persistent {
             run = run.persistent(read_goal);
         } else if self.is_interactive {

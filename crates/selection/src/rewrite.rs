@@ -1,6 +1,7 @@
 //! Rewriting of numbers in problems.
 
 use elbowroom_model::Task;
+use elbowroom_model::ground::{Action, Expression as GroundExpression};
 use elbowroom_model::problem::{
     Body, Comparison, DurationConstraint, Expression, Fluent, Function, FunctionId, ObjectId,
     Problem, Schema, SchemaId, Term,
@@ -8,7 +9,8 @@ use elbowroom_model::problem::{
 use elbowroom_num::Rational;
 
 /// Gives each instance of a schema its own duration, computed by `value` from its name and the
-/// domain's duration. Durations that the domain does not fix to a constant are not changed.
+/// planned duration: the domain's, or the expected one. Durations that the domain does not fix to a constant are not
+/// changed.
 pub fn set_durations(
     task: &Task,
     schema: SchemaId,
@@ -29,11 +31,26 @@ pub fn set_durations(
         return;
     };
     let planned = planned.clone();
-    let known = add_function_of(task, schema, "duration", problem, &|name, _| {
-        Some(value(name, &planned))
+    let has_expected = task.has_expected_durations();
+    let known = add_function_of(task, schema, "duration", problem, &|name, arguments| {
+        let action = has_expected.then(|| task.instantiate(schema, arguments).ok());
+        let expected = action.flatten().as_ref().and_then(fixed_duration);
+        Some(value(name, expected.as_ref().unwrap_or(&planned)))
     });
+    problem.expected_durations.is_included.insert(schema);
     if let Body::Durative { duration, .. } = &mut problem.schemas[schema.index()].body {
         duration[0].bound = known;
+    }
+}
+
+/// Returns the duration of an action if it is fixed to a number.
+pub(crate) fn fixed_duration(action: &Action) -> Option<Rational> {
+    let [only] = action.durative()?.duration.as_slice() else {
+        return None;
+    };
+    match (&only.comparison, &only.bound) {
+        (Comparison::Equal, GroundExpression::Constant(value)) => Some(value.clone()),
+        _ => None,
     }
 }
 

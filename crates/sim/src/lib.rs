@@ -44,10 +44,10 @@ mod sim;
 pub use cdf::{Side, rounding_edge};
 pub use draw::{Distribution, Purpose};
 pub use duration_control::{ControlledWorld, DurationController, FixedDurations, StartedAction};
+pub use elbowroom_model::pattern::ActionPattern;
 pub use fault_injection::FaultInjector;
 pub use model::{
     Amount, ExogenousChange, ExogenousEvent, FactOutcome, FailureRule, FailureTime, Hazard,
     Outcome, OutcomeChange, ReportReliability, Rule, Template, WorldModel,
 };
-pub use pattern::ActionPattern;
 pub use sim::{ObservedChanges, SimWorld};

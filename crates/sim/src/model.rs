@@ -1,16 +1,17 @@
 //! Contents of a world file: `docs/formats/world.md`.
 
+mod expected_durations;
 mod hazard;
 mod outcome;
 mod text;
 
 use elbowroom_model::Problem;
+use elbowroom_model::pattern::ActionPattern;
 use elbowroom_num::Rational;
 use elbowroom_text::{Diagnostics, Source};
 use rand::Rng;
 
 use crate::draw::{Distribution, rounded};
-use crate::pattern::ActionPattern;
 
 pub use hazard::Hazard;
 pub use outcome::{FactOutcome, Outcome, OutcomeChange, Template};

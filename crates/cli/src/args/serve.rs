@@ -106,6 +106,15 @@ pub(crate) enum CtlCommand {
     Guarantee,
     /// Print the next action and its reason
     Next,
+    /// Print the closed goals and the ended actions, the latest first, also from earlier segments of the journal
+    History {
+        /// Only those before this time of the world's clock
+        #[arg(long, value_name = "T", allow_negative_numbers = true)]
+        before: Option<Rational>,
+        /// Number of entries, at most 1000
+        #[arg(long, value_name = "N", default_value_t = 100)]
+        limit: usize,
+    },
     /// Print each line of the trace when it is written, until the executive ends
     Events {
         /// Start after line N of the trace instead of with the next line
@@ -120,32 +129,8 @@ pub(crate) enum CtlCommand {
         /// Its name; the goal of the same name is replaced
         #[arg(long, value_name = "NAME")]
         name: Option<String>,
-        /// Its value, a positive number [default: 1]; if not all goals can be reached together, those with the greatest sum of
-        /// values are pursued
-        #[arg(long, value_name = "V", allow_negative_numbers = true)]
-        value: Option<Rational>,
-        /// Deadline on the world's clock; a goal that is not achieved by then is closed as failed
-        #[arg(
-            long,
-            value_name = "T",
-            conflicts_with = "within",
-            allow_negative_numbers = true
-        )]
-        deadline: Option<Rational>,
-        /// The deadline in seconds from now
-        #[arg(long, value_name = "S", allow_negative_numbers = true)]
-        within: Option<Rational>,
-        /// Release time on the world's clock: the goal is queued until then, and not planned for
-        #[arg(
-            long,
-            value_name = "T",
-            conflicts_with = "after",
-            allow_negative_numbers = true
-        )]
-        release: Option<Rational>,
-        /// The release time in seconds from now
-        #[arg(long, value_name = "S", allow_negative_numbers = true)]
-        after: Option<Rational>,
+        #[command(flatten)]
+        terms: GoalTerms,
         /// Keep the goal: achieve it again whenever it does not hold and no other goal is pursued,
         /// until it is cancelled
         #[arg(long, conflicts_with_all = ["deadline", "within"])]
@@ -158,6 +143,17 @@ pub(crate) enum CtlCommand {
         /// is idle because no plan was found
         #[arg(long)]
         wait: bool,
+    },
+    /// Print the outcome of a goal if it were given now and everything went as planned
+    ///
+    /// The time at which it would be done, the least slack, and the goals that would be missed. The run does not change.
+    /// Exit code 0: it would be achieved; 1: it would not; 3: undecided
+    WhatIf {
+        /// The goal, in PDDL, as after `:goal`
+        #[arg(value_name = "GOAL")]
+        goal: String,
+        #[command(flatten)]
+        terms: GoalTerms,
     },
     /// Abandon a goal
     Cancel {
@@ -206,4 +202,35 @@ pub(crate) enum CtlCommand {
     Stop,
     /// Print the `OpenAPI` description of the interface, for client generators
     Openapi,
+}
+
+/// Value and times of a goal.
+#[derive(Debug, Args)]
+pub(crate) struct GoalTerms {
+    /// Its value, a positive number [default: 1]; if not all goals can be reached together, those with the greatest sum of
+    /// values are pursued
+    #[arg(long, value_name = "V", allow_negative_numbers = true)]
+    pub(crate) value: Option<Rational>,
+    /// Deadline on the world's clock; a goal that is not achieved by then is closed as failed
+    #[arg(
+        long,
+        value_name = "T",
+        conflicts_with = "within",
+        allow_negative_numbers = true
+    )]
+    pub(crate) deadline: Option<Rational>,
+    /// The deadline in seconds from now
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    pub(crate) within: Option<Rational>,
+    /// Release time on the world's clock: the goal is queued until then, and not planned for
+    #[arg(
+        long,
+        value_name = "T",
+        conflicts_with = "after",
+        allow_negative_numbers = true
+    )]
+    pub(crate) release: Option<Rational>,
+    /// The release time in seconds from now
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    pub(crate) after: Option<Rational>,
 }

@@ -1,30 +1,28 @@
 //! `elbowroom ctl`: client of an executive, `docs/serve.md`.
 
+mod words;
+
 use std::fmt::Write as _;
 use std::io::{self, ErrorKind};
 use std::time::Duration;
 
-use elbowroom::answers::exact::{INFINITY, MINUS_INFINITY};
-use elbowroom::execution::GuaranteeLevel;
+use elbowroom::num::Rational;
 use elbowroom::num::work::Stop;
-use elbowroom::num::{End, Rational};
 use elbowroom::report::exact::Exact;
 use elbowroom_executive::http::{self, AccessControl};
 use elbowroom_executive::interface::documents::{
-    GivenNumber, GoalNow, GoalsNow, GuaranteeNow, NewFact, NewGoal, NewNumber, NewOutcome,
-    NewProblem, NextNow, PlanNow, Refusal, State, StepNow, Taken,
+    GivenNumber, GoalNow, GoalsNow, NewFact, NewGoal, NewNumber, NewOutcome, NewProblem, Refusal,
+    State, Taken, WhatIf,
 };
-use elbowroom_executive::messages::{count_with_noun, escape_control, io_error_message};
+use elbowroom_executive::messages::{escape_control, io_error_message};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use crate::args::{CtlArgs, CtlCommand};
+use crate::args::{CtlArgs, CtlCommand, GoalTerms};
 use crate::exit::{Answer, Exit, Failure};
-use crate::number::nearest;
 use crate::output::{self, Output};
-use crate::terminal::{EMPHASIS, stdout_layout, styled};
-use elbowroom::report::console::wrap;
+use words::{goals, guarantee, history, next, plan, state, what_if};
 
 /// Sends the request and prints the answer.
 pub(crate) fn run(arguments: &CtlArgs, output: &mut Output) -> Answer {
@@ -35,6 +33,13 @@ pub(crate) fn run(arguments: &CtlArgs, output: &mut Output) -> Answer {
         CtlCommand::Plan => client.show(output, "/v1/plan", plan),
         CtlCommand::Guarantee => client.show(output, "/v1/guarantee", guarantee),
         CtlCommand::Next => client.show(output, "/v1/next", next),
+        CtlCommand::History { before, limit } => {
+            let mut path = format!("/v1/history?limit={limit}");
+            if let Some(before) = before {
+                let _ = write!(path, "&before={before}");
+            }
+            client.show(output, &path, history)
+        }
         CtlCommand::Events { after } => client.events(*after),
         CtlCommand::Openapi => {
             let (document, _) = client.request::<Value>(("GET", "/v1/openapi.json"), None)?;
@@ -44,31 +49,23 @@ pub(crate) fn run(arguments: &CtlArgs, output: &mut Output) -> Answer {
         CtlCommand::Goal {
             goal,
             name,
-            value,
-            deadline,
-            within,
-            release,
-            after,
+            terms,
             keep,
             by,
             wait,
         } => {
             let new = NewGoal {
                 name: name.clone(),
-                goal: goal.clone(),
-                value: value.clone().map(GivenNumber),
-                deadline: deadline.clone().map(GivenNumber),
-                within: within.clone().map(GivenNumber),
-                release: release.clone().map(GivenNumber),
-                after: after.clone().map(GivenNumber),
                 keep: *keep,
                 by: by.clone(),
+                ..new_goal(goal, terms)
             };
             if *wait {
                 return client.submit_goal_and_wait(output, &new);
             }
             client.change(output, ("POST", "/v1/goals"), Some(&new))
         }
+        CtlCommand::WhatIf { goal, terms } => client.what_if(output, &new_goal(goal, terms)),
         CtlCommand::Cancel { name } => {
             let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte);
             if name.is_empty() || !name.bytes().all(is_plain) {
@@ -114,6 +111,22 @@ pub(crate) fn run(arguments: &CtlArgs, output: &mut Output) -> Answer {
         CtlCommand::Pause => client.change(output, ("POST", "/v1/pause"), NO_BODY),
         CtlCommand::Resume => client.change(output, ("POST", "/v1/resume"), NO_BODY),
         CtlCommand::Stop => client.change(output, ("POST", "/v1/stop"), NO_BODY),
+    }
+}
+
+/// Returns the document of a goal without a name.
+fn new_goal(goal: &str, terms: &GoalTerms) -> NewGoal {
+    let number = |number: &Option<Rational>| number.clone().map(GivenNumber);
+    NewGoal {
+        name: None,
+        goal: goal.to_owned(),
+        value: number(&terms.value),
+        deadline: number(&terms.deadline),
+        within: number(&terms.within),
+        release: number(&terms.release),
+        after: number(&terms.after),
+        keep: false,
+        by: None,
     }
 }
 
@@ -240,6 +253,23 @@ impl Client<'_> {
         Ok(Exit::Yes)
     }
 
+    /// Prints the predicted outcome of a goal.
+    fn what_if(&self, output: &mut Output, new: &NewGoal) -> Answer {
+        let body = serde_json::to_string(new).ok();
+        let what = ("POST", "/v1/what-if");
+        let (answer, value) = self.request::<WhatIf>(what, body.as_deref())?;
+        if self.arguments.json {
+            output.json(&value)?;
+        } else {
+            output::print(&what_if(&answer))?;
+        }
+        Ok(match answer.verdict.as_str() {
+            "achieved" => Exit::Yes,
+            "undecided" => Exit::Limit,
+            _ => Exit::No,
+        })
+    }
+
     /// Submits a goal, and waits until it is closed or the executive is idle without a plan for it.
     fn submit_goal_and_wait(&self, output: &mut Output, new: &NewGoal) -> Answer {
         let (before, _) = self.request::<State>(("GET", "/v1/state"), None)?;
@@ -307,202 +337,4 @@ impl Client<'_> {
             "if it has a journal, `elbowroom serve --resume` continues it",
         ))
     }
-}
-
-fn goals(goals: &GoalsNow) -> String {
-    let mut text = String::new();
-    for goal in &goals.goals {
-        let name = escape_control(&goal.name);
-        let state = styled(EMPHASIS, &goal.state.replace('-', " "));
-        let since = nearest(&goal.since.0);
-        let value = match &goal.value.0 {
-            value if *value == Rational::ONE => String::new(),
-            value => format!(", value {}", nearest(value)),
-        };
-        let time = |word: &str, time: &Option<Exact>| {
-            let time = time.as_ref();
-            time.map_or(String::new(), |it| format!(", {word} {}", nearest(&it.0)))
-        };
-        let (from, until) = (time("from", &goal.release), time("by", &goal.deadline));
-        let keep = if goal.keep { ", to be kept" } else { "" };
-        let author = goal.by.as_ref();
-        let author = author.map_or(String::new(), |it| {
-            format!(", given by {}", escape_control(it))
-        });
-        let mut line = format!(
-            "{name}{value}{from}{until}{keep}{author}: {state} since {since}: {}",
-            escape_control(&goal.goal)
-        );
-        if let Some(why) = &goal.why {
-            let _ = write!(line, "; {}", escape_control(why));
-        }
-        let _ = writeln!(text, "{}", wrap(&line, stdout_layout().width, 2));
-    }
-    if text.is_empty() {
-        text.push_str("there is no goal\n");
-    }
-    text
-}
-
-fn state(state: &State) -> String {
-    let mut text = format!(
-        "{} at {}, plan {}",
-        styled(EMPHASIS, &state.activity.to_string()),
-        nearest(&state.now.0),
-        state.plans
-    );
-    if let Some(why) = &state.why {
-        let _ = write!(text, ": {}", escape_control(why));
-    }
-    text.push('\n');
-    if let Some(why) = &state.restarting {
-        let why = format!("world restarting: {}", escape_control(why));
-        let _ = writeln!(text, "{}", wrap(&why, stdout_layout().width, 2));
-    }
-    if let Some(seconds) = state.unanswered {
-        let why = format!(
-            "the world has not answered for {seconds} s: until it does, no action is started and \
-             no request is processed"
-        );
-        let _ = writeln!(text, "{}", wrap(&why, stdout_layout().width, 2));
-    }
-    for goal in &state.goals {
-        let (name, pddl) = (escape_control(&goal.name), escape_control(&goal.goal));
-        let aside = goal.aside.as_ref();
-        let aside = aside.map_or(String::new(), |why| {
-            format!("; set aside: {}", escape_control(why))
-        });
-        let release = goal.release.as_ref();
-        let release = release.map_or(String::new(), |it| {
-            format!("; queued until {}", nearest(&it.0))
-        });
-        let keep = goal.keep.as_ref();
-        let keep = keep.map_or(String::new(), |state| format!("; to be kept, {state}"));
-        let _ = writeln!(text, "  goal {name}: {pddl}{aside}{keep}{release}");
-    }
-    for running in &state.running {
-        let _ = write!(
-            text,
-            "  running {} (ticket {}) since {}",
-            running.action,
-            running.ticket,
-            nearest(&running.since.0)
-        );
-        if let Some(planned) = &running.planned {
-            let _ = write!(text, ", planned {}", nearest(&planned.0));
-        }
-        if let Some(times_out) = &running.times_out {
-            let times_out = nearest(&times_out.0);
-            let _ = write!(text, "; without progress, it times out at {times_out}");
-        }
-        if let Some(needed) = &running.needed {
-            let _ = write!(
-                text,
-                "; if it continues, a new plan is needed at {}",
-                nearest(&needed.0)
-            );
-        }
-        if let Some(note) = &running.note {
-            let _ = write!(text, ": {}", escape_control(note));
-        }
-        text.push('\n');
-    }
-    for doubt in &state.in_doubt {
-        let (name, since) = (escape_control(&doubt.name), nearest(&doubt.since.0));
-        let line = format!(
-            "{name} is in doubt since {since}: {}",
-            escape_control(&doubt.why)
-        );
-        let _ = writeln!(text, "{}", wrap(&line, stdout_layout().width, 2));
-    }
-    let _ = writeln!(text, "  {}", count_with_noun(state.facts.len(), "fact"));
-    for fact in &state.facts {
-        let _ = writeln!(text, "    {fact}");
-    }
-    for number in &state.numbers {
-        let _ = writeln!(text, "    {} = {}", number.fluent, nearest(&number.value.0));
-    }
-    text
-}
-
-fn step(step: &StepNow) -> String {
-    let duration = step.duration.as_ref();
-    let duration = duration.map_or(String::new(), |it| format!(" [{}]", nearest(&it.0)));
-    format!(
-        "{:>10}: {}{duration} {}",
-        nearest(&step.start.0),
-        step.action,
-        step.state
-    )
-}
-
-fn plan(plan: &PlanNow) -> String {
-    let mut text = match &plan.since {
-        Some(since) => format!("plan {}, since {}\n", plan.plans, nearest(&since.0)),
-        None => "there is no plan\n".to_owned(),
-    };
-    for own in &plan.steps {
-        let _ = writeln!(text, "{}", step(own));
-    }
-    text
-}
-
-fn guarantee(guarantee: &GuaranteeNow) -> String {
-    let promise = guarantee.promise.as_deref();
-    let mut known = GuaranteeLevel::TERMS.iter();
-    let level = known.find(|(_, name, _)| Some(*name) == promise);
-    let name = match level {
-        Some((level, ..)) => level.label(),
-        None if promise.is_some() => GuaranteeLevel::Luck.label(),
-        None => "none",
-    };
-    let condition = level.and_then(|(level, ..)| level.condition());
-    let mut text = format!("guarantee: {name}");
-    if let Some(since) = &guarantee.since {
-        let _ = write!(text, ", since {}", nearest(&since.0));
-    }
-    text.push('\n');
-    if let Some(deviation) = &guarantee.deviation {
-        let _ = writeln!(text, "  last deviation: {}", escape_control(deviation));
-    }
-    if let Some(condition) = condition {
-        let before = match guarantee.timeout.as_str() {
-            "none" => "",
-            _ => " and each action ends before its time-out",
-        };
-        let _ = writeln!(text, "  the plan works as long as {condition}{before}");
-    }
-    let end = |end: &End, infinity: &str| end.value().map_or(infinity.to_owned(), nearest);
-    for room in &guarantee.parameters {
-        let nominal = nearest(&room.nominal.0);
-        let _ = write!(text, "  {}, {}: planned {nominal}", room.name, room.meaning);
-        if let (Some(least), Some(most)) = (&room.least, &room.most) {
-            let (least, most) = (end(&least.0, MINUS_INFINITY), end(&most.0, INFINITY));
-            let _ = write!(text, ", from {least} to {most}");
-        }
-        if let Some(timeout) = &room.timeout {
-            let _ = write!(text, ", time-out {}", nearest(&timeout.0));
-        }
-        text.push('\n');
-    }
-    text
-}
-
-fn next(next: &NextNow) -> String {
-    let mut text = next
-        .decision
-        .as_deref()
-        .unwrap_or("no decision yet")
-        .to_owned();
-    if let Some(until) = &next.until {
-        let _ = write!(text, " until {}", nearest(&until.0));
-    }
-    if let Some(why) = &next.why {
-        let _ = write!(text, ": {}", escape_control(why));
-    }
-    text.push('\n');
-    if let Some(own) = &next.step {
-        let _ = writeln!(text, "{}", step(own));
-    }
-    text
 }

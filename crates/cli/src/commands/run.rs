@@ -80,7 +80,7 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
     let (inputs, first) = checked(arguments, spec, &names, output)?;
     let interrupt = Interrupt::listen_with_world();
     let journal = journal(arguments, RESUME)?;
-    let page = Page::open(arguments, inputs.spec(), inputs.task(), &interrupt)?;
+    let page = Page::open(arguments, &inputs, &interrupt)?;
     let job = Job {
         journal,
         started: &|| (),
@@ -228,10 +228,7 @@ pub(super) fn print_outcome(
 
 /// Reads the problem of a specification and prints its warnings.
 pub(super) fn task(spec: &RunSpec, output: &mut Output) -> Result<Task, Failure> {
-    let (domain, problem) = (spec.domain.source(), spec.problem.source());
-    let read = elbowroom::pddl::read_problem(&domain, &problem);
-    let problem = Arc::new(input::with_warnings(read, output)?);
-    Ok(Task::new(problem).with_epsilon(spec.epsilon.clone()))
+    input::with_warnings(spec.read_task(), output)
 }
 
 /// Starts learning from the journal at `path` if the arguments ask for it.
@@ -284,9 +281,9 @@ impl CommandHost<'_> {
 }
 
 impl RunHost for CommandHost<'_> {
-    fn operator(&self, spec: &RunSpec, task: &Arc<Task>) -> Result<OperatorInterface, Error> {
+    fn operator(&self, inputs: &RunInputs) -> Result<OperatorInterface, Error> {
         match self.resume {
-            Some(host) => host.operator(spec, task, self.interrupt),
+            Some(host) => host.operator(inputs, self.interrupt),
             None => Ok(OperatorInterface::default()),
         }
     }

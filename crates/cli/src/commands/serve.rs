@@ -11,7 +11,7 @@ use elbowroom::pddl::{self, Source};
 use super::run::resume::{self, ResumeHost};
 use super::run::spec;
 use super::run::{Job, RESUME_SERVE, access, checked, journal};
-use crate::args::ServeArgs;
+use crate::args::{RunArgs, ServeArgs};
 use crate::calendar::with_calendar;
 use crate::exit::{Answer, Exit, Failure};
 use crate::input;
@@ -19,6 +19,7 @@ use crate::interrupt::Interrupt;
 use crate::output::{self, Output};
 use elbowroom_executive::api::{self, ApiError, ApiRouter, Client};
 use elbowroom_executive::clock::Clock;
+use elbowroom_executive::history::HistoryFiles;
 use elbowroom_executive::journal::Segments;
 use elbowroom_executive::operator::OperatorInterface;
 use elbowroom_executive::{Error, make_persistent};
@@ -79,6 +80,7 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
     let journal =
         journal.map(|file| file.with_rotation(Some(segments(arguments)), &output::warnings()));
     let router = open(arguments, &interrupt, &domain_text)?;
+    set_history_files(&router, &arguments.run);
     let (inputs, first, client) = if let Some((inputs, first)) = given {
         (inputs, first, None)
     } else {
@@ -99,7 +101,7 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
         }
     };
     let answer = router
-        .begin_run(inputs.spec(), inputs.task())
+        .begin_run(&inputs)
         .map_err(Failure::from)
         .and_then(|operator| {
             if client.is_none() {
@@ -238,6 +240,16 @@ fn check(arguments: &ServeArgs) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Sets the files of the history: the journal, and the folder with copies of its segments.
+fn set_history_files(router: &ApiRouter, arguments: &RunArgs) {
+    if let Some(journal) = arguments.journal.as_ref().or(arguments.resume.as_ref()) {
+        router.set_history_files(HistoryFiles {
+            journal: journal.clone(),
+            archive: arguments.learn.clone(),
+        });
+    }
+}
+
 /// Starts the HTTP interface.
 fn open(
     arguments: &ServeArgs,
@@ -282,10 +294,10 @@ struct Server<'a> {
 impl ResumeHost for Server<'_> {
     fn operator(
         &self,
-        spec: &RunSpec,
-        task: &Arc<Task>,
+        inputs: &RunInputs,
         interrupt: &Interrupt,
     ) -> Result<OperatorInterface, Error> {
+        let spec = inputs.spec();
         if !spec.is_persistent {
             return Err(Error::new(
                 "this is the journal of a single run (`elbowroom run`)",
@@ -293,7 +305,8 @@ impl ResumeHost for Server<'_> {
             ));
         }
         let router = open(self.arguments, interrupt, &spec.domain)?;
-        let operator = router.begin_run(spec, task);
+        set_history_files(&router, &self.arguments.run);
+        let operator = router.begin_run(inputs);
         announce(self.arguments, &router);
         let _ = self.router.set(router);
         operator

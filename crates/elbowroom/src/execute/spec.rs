@@ -1,6 +1,7 @@
 //! Specification of a run as data: [`RunSpec`].
 
 mod assembly;
+mod beliefs;
 mod error;
 mod text_form;
 
@@ -9,12 +10,11 @@ use std::sync::Arc;
 use elbowroom_envelope::{Guarantee, Objective};
 use elbowroom_execution::executors::ExecutorSpec;
 use elbowroom_execution::run::{PlanningTime, RunSettings, RunningRule, TimeoutRule};
-use elbowroom_model::{Problem, Task};
+use elbowroom_model::Task;
 use elbowroom_num::Rational;
 use elbowroom_plan::parametrize::VarySpec;
 use elbowroom_probability::{Likelihoods, likelihoods};
-use elbowroom_sim::WorldModel;
-use elbowroom_text::{Diagnostics, Source};
+use elbowroom_text::Source;
 use serde::{Deserialize, Serialize};
 
 use super::{Embedded, FirstPlan, PLANNING_BUDGET};
@@ -59,6 +59,14 @@ pub struct RunSpec {
     /// changes of facts. Omitted if it believes the file of the simulation, or knows nothing of its process.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub believed: Option<String>,
+    /// `true` if plans, envelopes and deadlines use the mean durations of [`Self::believed`] in place of the durations
+    /// that the domain fixes ([`RunSpec::usual_durations`]). Omitted if `false`.
+    #[serde(
+        default,
+        rename = "believed_durations",
+        skip_serializing_if = "std::ops::Not::not"
+    )]
+    pub plans_believed_durations: bool,
     /// `true` if the world is an object in the process of the run, and `world_process` its description. Omitted if
     /// `false`.
     #[serde(
@@ -229,6 +237,7 @@ impl RunSpec {
             world: None,
             world_process: None,
             believed: None,
+            plans_believed_durations: false,
             is_world_embedded: false,
             spoiler: None,
             planner: EMBEDDED.to_owned(),
@@ -276,6 +285,15 @@ impl RunSpec {
         }
     }
 
+    /// Returns the expected planning time in the world; 0 if it is measured, because it is not
+    /// known in advance.
+    fn expected_planning_time(&self) -> Rational {
+        match &self.planning_time {
+            PlanningTime::Seconds(seconds) => seconds.clone(),
+            PlanningTime::Measured => Rational::ZERO,
+        }
+    }
+
     /// Returns `true` if plans can be made in the background: there is a clock that measures
     /// planning times, and the planner keeps no state between plans.
     pub fn can_plan_in_background(&self) -> bool {
@@ -301,38 +319,6 @@ impl RunSpec {
         flow
     }
 
-    /// Returns the world file that the executor believes: [`Self::believed`], or that of the simulation.
-    pub fn believed_world(&self) -> Option<&str> {
-        let simulated = self.world.as_ref().filter(|_| self.world_process.is_none());
-        self.believed.as_ref().or(simulated).map(String::as_str)
-    }
-
-    /// Returns the model of the world that the executor believes: that of [`Self::believed_world`],
-    /// or, in a simulation without one, a model where everything goes as planned. `None` if the
-    /// world is a process without a believed world.
-    ///
-    /// # Errors
-    /// When the world file cannot be read.
-    fn beliefs(&self, problem: &Problem, name: &str) -> Result<Option<WorldModel>, Diagnostics> {
-        match self.believed_world() {
-            Some(text) => read_world(name, text, problem).map(Some),
-            None if self.world_process.is_some() => Ok(None),
-            None => Ok(Some(WorldModel::without_deviations())),
-        }
-    }
-
-    /// Returns the model of the simulated world; `None` if the world is a process.
-    ///
-    /// # Errors
-    /// When the world file cannot be read.
-    fn simulation(&self, problem: &Problem, name: &str) -> Result<Option<WorldModel>, Diagnostics> {
-        match &self.world {
-            _ if self.world_process.is_some() => Ok(None),
-            Some(text) => read_world(name, text, problem).map(Some),
-            None => Ok(Some(WorldModel::without_deviations())),
-        }
-    }
-
     /// Returns the likelihoods for the executor.
     ///
     /// # Errors
@@ -344,8 +330,4 @@ impl RunSpec {
         let read = likelihoods::read(file.source(), task);
         read.map(Arc::new).map_err(SpecError::Likelihoods)
     }
-}
-
-fn read_world(name: &str, text: &str, problem: &Problem) -> Result<WorldModel, Diagnostics> {
-    WorldModel::read(Source::new(name, text), problem)
 }

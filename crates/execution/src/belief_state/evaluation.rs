@@ -105,6 +105,11 @@ impl BeliefState {
         self.evaluate_condition(condition, duration, Mode::OnArrival)
     }
 
+    /// Returns the value of an expression without `?duration` now; `None` if it has none.
+    pub(crate) fn value_of(&self, expression: &Expression) -> Option<Rational> {
+        evaluate(expression, None, &|fluent| self.value(fluent)).ok()
+    }
+
     fn evaluate_condition(
         &self,
         condition: &Condition,

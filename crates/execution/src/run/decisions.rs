@@ -95,15 +95,19 @@ impl Run<'_> {
             let ticket = self.action_log.open(&order, &self.now);
             let planned = order.duration.clone().unwrap_or_default();
             let timeout = self.settings.timeout.of(&order.action.name, &planned);
+            let expected = self.domain.is_some().then(|| order.duration.clone());
+            let (action, duration) = self.in_domain(order.action, order.duration);
+            let expected = expected.filter(|expected| *expected != duration).flatten();
             let command = Command::Start {
                 ticket,
-                action: order.action,
-                duration: order.duration,
+                action,
+                duration,
             };
             self.ports.recorder.record(&Entry::Command {
                 now: &self.now,
                 command: &command,
                 planned: &order.planned,
+                expected: expected.as_ref(),
                 timeout: timeout.as_ref(),
             });
             commands.push(command);
@@ -131,6 +135,7 @@ impl Run<'_> {
                 now: &self.now,
                 command: &command,
                 planned: &Planned::default(),
+                expected: None,
                 timeout: None,
             });
             self.action_log.note_cancel(ticket, &self.now);

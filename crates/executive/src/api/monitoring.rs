@@ -55,6 +55,9 @@ fn metrics(state: &State, goals: Option<&GoalsNow>, is_ready: bool) -> String {
     let silence = "Time for which the world has not answered, in seconds.";
     let seconds = u32::try_from(state.unanswered.unwrap_or_default()).unwrap_or(u32::MAX);
     gauge("world_silence_seconds", silence, f64::from(seconds));
+    let restarting = "1 while the world's program is being started again, 0 otherwise.";
+    let is_restarting = f64::from(u8::from(state.restarting.is_some()));
+    gauge("world_restarting", restarting, is_restarting);
     gauge(
         "running_actions",
         "Running actions.",

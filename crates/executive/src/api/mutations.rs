@@ -2,6 +2,7 @@
 //! its queue.
 
 use std::collections::BTreeSet;
+use std::sync::TryLockError;
 use std::time::Duration;
 
 use elbowroom::execution::run::PROBLEM_GOAL_NAME;
@@ -14,12 +15,13 @@ use serde::de::DeserializeOwned;
 use super::router::{Accepted, ApiError, ApiRouter, ServedRun};
 use crate::error::Error;
 use crate::interface::documents::{
-    Activity, NewFact, NewGoal, NewNumber, NewOutcome, NewProblem, State, Taken,
+    Activity, NewFact, NewGoal, NewNumber, NewOutcome, NewProblem, State, Taken, WhatIf,
 };
 use crate::interface::goal_text;
 use crate::messages::count_with_noun;
 use crate::request_check::{check, check_target};
 use crate::request_queue::{ExternalRequest, RequestStatus};
+use crate::what_if::what_if;
 
 /// Time limit for a client to wait until the run accepts its request.
 const ACCEPT_TIMEOUT: Duration = Duration::from_secs(2);
@@ -128,6 +130,23 @@ impl ApiRouter {
         let request = self.names.request(given, &self.run()?.status);
         let (name, request) = request.map_err(invalid)?;
         self.submit_checked(request, Some(name))
+    }
+
+    /// Simulates the run with another goal, in the thread of the client. One simulation runs at a time.
+    pub(super) fn what_if(&self, body: &[u8]) -> Result<WhatIf, ApiError> {
+        let run = self.run()?;
+        run.check_accepts(Accepted::Everything)?;
+        let given = read(body)?;
+        let busy = |_| {
+            let help = "repeat the request when the other one has its answer";
+            ApiError::new(503, "another hypothetical goal is being simulated", help)
+        };
+        let _held = match self.simulation.try_lock() {
+            Err(TryLockError::Poisoned(held)) => held.into_inner(),
+            held => held.map_err(busy)?,
+        };
+        what_if(&run.inputs, &run.status, given)
+            .map_err(|error| ApiError::new(422, error.message(), error.advice()))
     }
 
     /// Submits a request about an open goal or a running action if the run knows it.

@@ -1,9 +1,15 @@
 //! Queries of the state of an executive.
 
+use std::sync::TryLockError;
+
 use elbowroom::num::Rational;
 
-use super::router::ApiRouter;
-use crate::interface::documents::{Activity, State};
+use super::router::{ApiError, ApiRouter};
+use crate::history::page;
+use crate::interface::documents::{Activity, HistoryNow, State};
+
+/// Number of entries of a page, if the client does not give one.
+const DEFAULT_PAGE: usize = 100;
 
 impl ApiRouter {
     /// Returns the state of the executive.
@@ -28,5 +34,37 @@ impl ApiRouter {
                 in_doubt: Vec::new(),
             },
         }
+    }
+
+    /// Returns a page of the history. One page is read at a time.
+    pub(super) fn history_page(&self, query: &str) -> Result<HistoryNow, ApiError> {
+        let run = self.run()?;
+        let help = "for example /v1/history?before=120.5&limit=50";
+        let (mut before, mut limit) = (None, DEFAULT_PAGE);
+        for member in query.split('&').filter(|member| !member.is_empty()) {
+            let wrong = |expected: &str| {
+                let error = format!("expected {expected}, found `{}`", member.escape_debug());
+                ApiError::new(422, error, help)
+            };
+            match member.split_once('=') {
+                Some(("before", time)) => {
+                    let time = time.replace("%2F", "/").parse::<Rational>();
+                    before = Some(time.map_err(|_| wrong("a time in `before`"))?);
+                }
+                Some(("limit", number)) => {
+                    let number = number.parse::<usize>().ok().filter(|it| *it > 0);
+                    limit = number.ok_or_else(|| wrong("a positive number in `limit`"))?;
+                }
+                _ => return Err(wrong("`before` or `limit`")),
+            }
+        }
+        let busy = |_| ApiError::new(503, "another page of the history is being read", help);
+        let _reading = match self.history.try_lock() {
+            Err(TryLockError::Poisoned(lock)) => lock.into_inner(),
+            lock => lock.map_err(busy)?,
+        };
+        let present = || self.buffer.trace();
+        let files = self.history_files.get();
+        Ok(page(files, &present, &run.status, before.as_ref(), limit))
     }
 }

@@ -5,7 +5,7 @@ use std::net::SocketAddr;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
-use elbowroom::execute::{NamedText, RunSpec};
+use elbowroom::execute::{NamedText, RunInputs};
 use elbowroom::model::Task;
 use elbowroom::report::trace::TraceWriter;
 use serde::Serialize;
@@ -14,6 +14,7 @@ use super::initial_problem::InitialProblem;
 use super::state_stream::DocumentCache;
 use crate::error::Error;
 use crate::goal_request::GoalNames;
+use crate::history::HistoryFiles;
 use crate::http::{
     AccessControl, Request, RequestError, Stream, is_local_name, respond, respond_with_events,
 };
@@ -70,6 +71,7 @@ pub(super) struct ServedRun {
     /// The problem, with its own table of facts, so that requests do not change the numbers of the run.
     pub(super) task: Task,
     accepted: Accepted,
+    pub(super) inputs: RunInputs,
 }
 
 /// HTTP interface of an executive, or of a run that ends with its goal.
@@ -89,6 +91,12 @@ pub struct ApiRouter {
     answered: Condvar,
     /// Names of goals that are submitted without a name.
     pub(super) names: GoalNames,
+    /// Held while a hypothetical goal is simulated.
+    pub(super) simulation: Mutex<()>,
+    /// Files of the history, if the run has a journal.
+    pub(super) history_files: OnceLock<HistoryFiles>,
+    /// Held while these files are read.
+    pub(super) history: Mutex<()>,
 }
 
 impl ApiRouter {
@@ -115,7 +123,15 @@ impl ApiRouter {
             changing: Mutex::new(0),
             answered: Condvar::new(),
             names: GoalNames::default(),
+            simulation: Mutex::default(),
+            history_files: OnceLock::new(),
+            history: Mutex::default(),
         }
+    }
+
+    /// Sets the files with the segments of the run.
+    pub fn set_history_files(&self, files: HistoryFiles) {
+        let _ = self.history_files.set(files);
     }
 
     /// Returns the request queue.
@@ -142,7 +158,8 @@ impl ApiRouter {
     ///
     /// # Errors
     /// When the specification cannot be written.
-    pub fn begin_run(&self, spec: &RunSpec, task: &Arc<Task>) -> Result<OperatorInterface, Error> {
+    pub fn begin_run(&self, inputs: &RunInputs) -> Result<OperatorInterface, Error> {
+        let (spec, task) = (inputs.spec(), inputs.task());
         let status = Status::new(task, spec.timeout.clone());
         let mut header = |line: &str| self.buffer.add(line);
         let written = TraceWriter::new(Arc::clone(task), &mut header).header(spec);
@@ -156,6 +173,7 @@ impl ApiRouter {
             status: status.clone(),
             task: task.with_own_table(),
             accepted,
+            inputs: inputs.clone(),
         });
         let buffer = self.buffer.clone();
         Ok(match accepted {
@@ -277,6 +295,11 @@ impl ApiRouter {
                 };
                 respond(stream, 202, TEXT, words)
             }
+            ("POST", "/v1/what-if") => {
+                self.allow(request)?;
+                let answer = self.what_if(&request.body)?;
+                respond(stream, 200, JSON, &text(&answer))
+            }
             ("POST", "/cancel") => {
                 self.allow(request)?;
                 for name in self.run()?.status.goals() {
@@ -295,24 +318,7 @@ impl ApiRouter {
                 Some(why) => respond(stream, 503, TEXT, &format!("{why}\n")),
             },
             ("GET", "/metrics") => respond(stream, 200, METRICS, &self.metrics()),
-            ("GET", "/v1/openapi.json") => respond(stream, 200, JSON, &text(&openapi())),
-            ("GET", "/v1/state") => respond(stream, 200, JSON, &text(&self.state())),
-            ("GET", "/v1/goals") => {
-                respond(stream, 200, JSON, &text(&self.run()?.status.all_goals()))
-            }
-            ("GET", "/v1/plan") => respond(stream, 200, JSON, &text(&self.run()?.status.plan())),
-            ("GET", "/v1/guarantee") => {
-                respond(stream, 200, JSON, &text(&self.run()?.status.guarantee()))
-            }
-            ("GET", "/v1/next") => respond(stream, 200, JSON, &text(&self.run()?.status.next())),
-            ("GET", path) => match path.strip_prefix("/v1/goals/") {
-                Some(name) => {
-                    let goal = self.run()?.status.goal(name);
-                    let goal = goal.ok_or_else(|| no_goal(name))?;
-                    respond(stream, 200, JSON, &text(&goal))
-                }
-                None => return Err(unknown_path_error(path, "GET")),
-            },
+            ("GET", _) => respond(stream, 200, JSON, &self.json_document(request)?),
             (method, path) => {
                 if !methods(path).any(|verb| verb == method) {
                     return Err(unknown_path_error(path, method));
@@ -321,6 +327,25 @@ impl ApiRouter {
                 let taken = self.change(method, path, &request.body)?;
                 let status = if taken.taken { 200 } else { 202 };
                 respond(stream, status, JSON, &text(&taken))
+            }
+        })
+    }
+
+    /// Returns the JSON document at the path of a request.
+    fn json_document(&self, request: &Request) -> Result<String, ApiError> {
+        Ok(match request.path.as_str() {
+            "/v1/openapi.json" => text(&openapi()),
+            "/v1/state" => text(&self.state()),
+            "/v1/goals" => text(&self.run()?.status.all_goals()),
+            "/v1/plan" => text(&self.run()?.status.plan()),
+            "/v1/guarantee" => text(&self.run()?.status.guarantee()),
+            "/v1/history" => text(&self.history_page(&request.query)?),
+            "/v1/next" => text(&self.run()?.status.next()),
+            path => {
+                let name = path.strip_prefix("/v1/goals/");
+                let name = name.ok_or_else(|| unknown_path_error(path, "GET"))?;
+                let goal = self.run()?.status.goal(name);
+                text(&goal.ok_or_else(|| no_goal(name))?)
             }
         })
     }

@@ -197,8 +197,8 @@ documents! {
         /// `unplanned` if none was found, when the executive is idle; `achieved`, `cancelled`, or
         /// `failed` if it was not achieved by its deadline.
         pub state: String,
-        /// The time at which it was given, by the world's clock; none if an earlier segment of the
-        /// journal contains it.
+        /// The time at which it was given, by the world's clock; none if an earlier segment of a journal of an earlier
+        /// version contains it.
         pub given: Option<Exact>,
         /// The time of the change to this state.
         pub since: Exact,
@@ -287,6 +287,9 @@ documents! {
         pub since: Option<Exact>,
         /// The last deviation that made the executor abandon a plan, since the executive was idle.
         pub deviation: Option<String>,
+        /// The durations of plans: `believed` for the mean durations of the believed world in place of those that the
+        /// domain fixes, otherwise `domain`.
+        pub durations: String,
         /// The rule that sets the time-out of each action: `10x,600` is 10 times the planned
         /// duration, at least 600 seconds; `none` if time-outs are off. The promise holds as long as each
         /// quantity stays inside its interval and each action ends before its time-out.
@@ -311,6 +314,16 @@ documents! {
         /// The time-out of the action whose duration it is; none if it is not a duration, or if
         /// time-outs are off.
         pub timeout: Option<Exact>,
+    }
+
+    /// A page of the history: closed goals and ended actions, the latest first.
+    pub struct HistoryNow {
+        /// The goals; `since` is the time at which each was closed.
+        pub goals: Vec<GoalNow>,
+        /// The actions.
+        pub actions: Vec<EndedAction>,
+        /// The next page has the entries before this time (`?before=`); none if there are no more.
+        pub next: Option<Exact>,
     }
 
     /// The last decision and the next action.
@@ -359,6 +372,24 @@ documents! {
         /// Name of the client, for the records: up to 64 characters.
         [optional serde(default)]
         pub by: Option<String>,
+    }
+
+    /// The predicted outcome of a hypothetical goal, if everything goes as planned.
+    pub struct WhatIf {
+        /// The final state of the goal: `achieved`, `failed`, `impossible`, `unplanned` or `set-aside`, as in
+        /// `GoalNow`; `undecided` if the limits of the simulation do not suffice.
+        pub verdict: String,
+        /// The time at which it is achieved, on the world's clock.
+        pub done: Option<Exact>,
+        /// The reason for another verdict, if it is known.
+        pub why: Option<String>,
+        /// The least slack of the present plan: the part of an interval that is left, from 0 to 1. None without a
+        /// guarantee that limits a duration.
+        pub slack_now: Option<Exact>,
+        /// The same of the first plan for the goal.
+        pub slack_then: Option<Exact>,
+        /// The names of goals that are pursued now, and would be set aside or missed.
+        pub missed: Vec<String>,
     }
 
     /// The end of a running action, reported or requested by a client.

@@ -3,8 +3,8 @@
 use serde_json::{Map, Value, json};
 
 use super::documents::{
-    GoalNow, GoalsNow, GuaranteeNow, NewFact, NewGoal, NewNumber, NewOutcome, NewProblem, NextNow,
-    PlanNow, Refusal, State, Taken,
+    GoalNow, GoalsNow, GuaranteeNow, HistoryNow, NewFact, NewGoal, NewNumber, NewOutcome,
+    NewProblem, NextNow, PlanNow, Refusal, State, Taken, WhatIf,
 };
 use super::schema::Described;
 
@@ -87,6 +87,12 @@ pub const METHODS: &[Method] = &[
         Answer::Json(GuaranteeNow::schema),
     ),
     get(
+        "/v1/history",
+        "Closed goals and ended actions, the latest first, also from earlier segments of the journal; with \
+         `?before=T&limit=N`, N of them before the time T",
+        Answer::Json(HistoryNow::schema),
+    ),
+    get(
         "/v1/next",
         "The next action and its reason",
         Answer::Json(NextNow::schema),
@@ -140,6 +146,15 @@ pub const METHODS: &[Method] = &[
     ),
     change("POST", "/v1/goals", "Adds a goal", Some(NewGoal::schema)),
     change("DELETE", "/v1/goals/{name}", "Abandons the goal", None),
+    Method {
+        answer: Answer::Json(WhatIf::schema),
+        ..change(
+            "POST",
+            "/v1/what-if",
+            "The outcome of a goal if it were given now and everything went as planned; the run does not change",
+            Some(NewGoal::schema),
+        )
+    },
     change(
         "POST",
         "/v1/actions",

@@ -1,7 +1,9 @@
 //! State of a run, for clients of an executive.
 
 mod ended;
+mod fork;
 mod goals;
+mod history;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -17,7 +19,7 @@ use elbowroom::num::Rational;
 use elbowroom::pddl::{ProblemText, write_problem};
 use elbowroom::plan::{InstanceId, ParameterId, ParameterKind};
 use elbowroom::report::exact::Exact;
-use elbowroom::report::trace::{ClosedGoalLine, SnapshotLine};
+use elbowroom::report::trace::SnapshotLine;
 
 use super::documents::{
     Activity, GoalNow, GoalsNow, GuaranteeNow, InDoubt, LowerEnd, NextNow, NumberNow, PlanNow,
@@ -25,15 +27,18 @@ use super::documents::{
 };
 use ended::EndedActions;
 use goals::GoalList;
+pub(crate) use history::SegmentHistory;
 
 /// Follows a persistent run by its record. Clones share the state. Requests are answered at once
 /// and do not block the run, because names are computed from a copy of the belief state.
-#[derive(Clone, Default)]
+#[derive(Clone)]
 pub struct Status(Arc<Mutex<StatusData>>);
 
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct StatusData {
     timeout: TimeoutRule,
+    /// The source of the durations of plans: `domain` or `believed`.
+    durations: &'static str,
     now: Rational,
     is_planning: bool,
     is_paused: bool,
@@ -45,6 +50,8 @@ struct StatusData {
     /// The reason for making a plan.
     planning_reason: Option<String>,
     goals: GoalList,
+    /// The goals at the beginning of the run.
+    first_goals: GoalList,
     running: BTreeMap<u64, Running>,
     /// The tickets of running actions whose start was reported.
     started: BTreeSet<u64>,
@@ -72,8 +79,15 @@ impl Status {
                 &Rational::ZERO,
             );
         }
+        let durations = if task.has_expected_durations() {
+            "believed"
+        } else {
+            "domain"
+        };
         let known = StatusData {
             timeout,
+            durations,
+            first_goals: goals.clone(),
             goals,
             ..StatusData::default()
         };
@@ -117,9 +131,10 @@ impl Status {
         self.lock().goals.find(name)
     }
 
-    /// Returns the most recently closed goals, for the snapshot of a new segment of the journal.
-    pub fn closed_goals(&self) -> Vec<ClosedGoalLine> {
-        self.lock().goals.closed()
+    /// Adds what only clients need to the snapshot of a new segment of the journal: the most recently closed goals, and
+    /// the times at which the open ones were given.
+    pub fn complete(&self, snapshot: &mut SnapshotLine) {
+        self.lock().goals.complete(snapshot);
     }
 
     /// Returns the present state. Its facts and numbers include timed initials and continuous
@@ -204,6 +219,7 @@ impl Status {
             promise: promise.map(|(promise, _)| promise.name().to_owned()),
             since: promise.map(|(_, since)| Exact(since.clone())),
             deviation: known.deviation.clone(),
+            durations: known.durations.to_owned(),
             timeout: known.timeout.to_string(),
             parameters,
         }
@@ -348,7 +364,12 @@ impl StatusData {
         match entry {
             Entry::PlanAdopted(mission) => self.adopt_plan(mission),
             Entry::Decided { now, decided } => self.decide(now, decided),
-            Entry::Command { now, command, .. } => self.command(now, command),
+            Entry::Command {
+                now,
+                command,
+                expected,
+                ..
+            } => self.command(now, command, *expected),
             Entry::Passed { now, .. } | Entry::Looked { now, .. } => self.now.clone_from(now),
             Entry::Taken {
                 observation,
@@ -511,13 +532,14 @@ impl StatusData {
         self.decided = Some((now.clone(), decided.clone()));
     }
 
-    fn command(&mut self, now: &Rational, command: &Command) {
+    /// Records a command; `expected` is the duration in the plan, if it differs from that of the command.
+    fn command(&mut self, now: &Rational, command: &Command, expected: Option<&Rational>) {
         let (ticket, action, duration) = match command {
             Command::Start {
                 ticket,
                 action,
                 duration,
-            } => (ticket, action, duration),
+            } => (ticket, action, expected.or(duration.as_ref())),
             Command::Cancel { ticket } => {
                 // An action without a reported start may have no reported end.
                 if !self.started.contains(&ticket.0) {
@@ -535,7 +557,7 @@ impl StatusData {
             ticket: ticket.0,
             action: action.name.clone(),
             since: Exact(now.clone()),
-            planned: duration.clone().map(Exact),
+            planned: duration.cloned().map(Exact),
             needed: None,
             times_out: None,
             completion: None,

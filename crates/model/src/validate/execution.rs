@@ -94,8 +94,9 @@ struct Recent {
 }
 
 impl Execution {
-    /// Creates an execution at time 0, before any event.
+    /// Creates an execution at time 0, before any event. Commands have the durations of the domain.
     pub fn new(task: &Task) -> Self {
+        let task = &task.with_domain_durations();
         Self {
             derivation: (0, Derivation::default()),
             present: PresentState::of(task, task.initial(), Rational::ZERO),

@@ -38,6 +38,27 @@ async function cancelGoal(goal) {
   if (await confirmed(`Cancel the goal ${goal.name}?`, text, "cancel the goal")) await request("DELETE", `v1/goals/${goal.name}`);
 }
 
+// Asks for the outcome of a hypothetical goal, and shows the answer as `elbowroom ctl what-if` prints it.
+async function whatIf(event) {
+  event.preventDefault();
+  const goal = { goal: byId("hypothetical").value.trim() };
+  if (byId("hypothetical-within").value) goal.within = byId("hypothetical-within").valueAsNumber;
+  byId("what-if-answer").textContent = "the run is simulated …";
+  const headers = { ...authorization(), "content-type": "application/json" };
+  const answer = await fetch("v1/what-if", { method: "POST", headers, body: JSON.stringify(goal) }).catch(() => null);
+  const body = await answer?.json().catch(() => null);
+  byId("what-if-answer").textContent = body ? (body.error ? `${body.error}: ${body.help}` : whatIfWords(body)) : "the executive does not answer";
+}
+byId("what-if").addEventListener("submit", whatIf);
+
+function whatIfWords(answer) {
+  const percent = (share) => `${nearest(100 * share.decimal)} %`;
+  let text = answer.done ? `done at ${nearest(answer.done.decimal)}` : answer.verdict.replace("-", " ");
+  if (answer.slack_then) text += answer.slack_now ? `, least slack ${percent(answer.slack_now)} to ${percent(answer.slack_then)}` : `, least slack ${percent(answer.slack_then)}`;
+  if (answer.why) text += `: ${answer.why}`;
+  return [text, ...answer.missed.map((name) => `${name} would be missed`)].join("; ");
+}
+
 // Shows the buttons, or asks for the token.
 function controlsView(changed) {
   const controls = byId("controls");
@@ -52,6 +73,7 @@ function controlsView(changed) {
   const form = element("form", { class: "token", onsubmit: give }, element("label", { for: "token" }, "token for requests "), field, element("button", { type: "submit" }, "use"));
   function show() {
     controls.replaceChildren(...(token ? [pause, stopping] : [form]));
+    byId("what-if").hidden = !token;
     if (token) byId("trace").href = `run#token=${token}`;
     changed();
   }

@@ -49,7 +49,7 @@ from ._errors import (
 )
 from ._execution import Cancel, Look, Over, Start, Stepped, Wait
 from ._executive import Executive
-from ._executive_answers import Doubt, Goal, PlannedAction, RunningAction, Status
+from ._executive_answers import Doubt, Goal, PlannedAction, RunningAction, Status, WhatIf
 from ._odds import ActionShare, FactShare, Happening, Loss, Odds, Sampled
 from ._plans import Plans
 from ._problem import Problem, read
@@ -150,6 +150,7 @@ __all__ = [
     "Verdict",
     "Violation",
     "Wait",
+    "WhatIf",
     "World",
     "WorldError",
     "compare",

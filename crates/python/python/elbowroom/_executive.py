@@ -14,7 +14,7 @@ from . import _executive_answers as answers
 from . import _native
 from ._background_run import BackgroundRun
 from ._errors import ExecutiveError, ExecutiveWarning, RequestError
-from ._executive_answers import Goal, PlannedAction, Status
+from ._executive_answers import Goal, PlannedAction, Status, WhatIf
 from ._lifecycle import POLL_INTERVAL
 from ._numbers import Number, document, text
 from ._problem import read
@@ -218,6 +218,27 @@ class Executive(BackgroundRun):
         self._given[name] = now
         self._check(state)
         return name
+
+    def what_if(
+        self,
+        goal: str,
+        *,
+        value: Number | None = None,
+        deadline: Number | None = None,
+        within: Number | None = None,
+        release: Number | None = None,
+        after: Number | None = None,
+    ) -> WhatIf:
+        """Returns the outcome of a goal if it were given now, and everything went as planned.
+
+        The run is not changed. The arguments are those of :meth:`submit`.
+
+        Raises:
+            RequestError: if the goal cannot be understood, or the run has not begun.
+        """
+        times = {"value": value, "deadline": deadline, "within": within, "release": release, "after": after}
+        given = {name: _text(it) for name, it in times.items() if it is not None}
+        return answers.what_if(document(self._native.what_if(json.dumps({"goal": goal, **given}))))
 
     def cancel(self, goal: str) -> None:
         """Cancels an open goal.

@@ -120,6 +120,28 @@ class Status(NamedTuple):
     """Facts and numbers that are in doubt. Such a fact counts as false."""
 
 
+class WhatIf(NamedTuple):
+    """The predicted outcome of a goal that is not given."""
+
+    verdict: str
+    """``"achieved"``, ``"failed"``, ``"impossible"``, ``"unplanned"``, ``"set-aside"`` or ``"undecided"``."""
+    done: Fraction | None
+    """The time at which it would be achieved."""
+    why: str | None
+    """The reason for another verdict, if it is known."""
+    slack_now: Fraction | None
+    """The least slack of the present plan: the part of an interval that is left, from 0 to 1."""
+    slack_then: Fraction | None
+    """The same of the first plan for the goal."""
+    missed: list[str]
+    """The goals that are pursued now, and would be set aside or missed."""
+
+
+def what_if(document: dict[str, Any]) -> WhatIf:
+    """The answer in a document."""
+    return WhatIf(*(document[field] for field in WhatIf._fields))
+
+
 def goals(document: dict[str, Any]) -> list[Goal]:
     """The goals in a document: first those that were closed, then the open ones, each in their order."""
     return [Goal(*(it[field] for field in Goal._fields)) for it in document["goals"]]

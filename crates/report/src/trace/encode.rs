@@ -37,11 +37,13 @@ impl Line {
                 now,
                 command,
                 planned,
+                expected,
                 timeout,
             } => Self::Command(CommandLine {
                 now: exact(now),
                 command: IssuedCommandLine::of(command),
                 planned: window(planned),
+                expected: expected.map(exact),
                 timeout: timeout.map(exact),
             }),
             Entry::Passed {

@@ -434,7 +434,7 @@ pub(super) fn read_plan(
         let action = if let Some(running) = running.get(index) {
             Arc::clone(&running.action)
         } else {
-            let action = instantiate(&step.action, task);
+            let action = action_named(&step.action, task);
             Arc::new(action.map_err(|message| TraceError { line, message })?)
         };
         plan.steps.push(Step {
@@ -450,10 +450,11 @@ fn message(line: &ObservationLine) -> Value {
     serde_json::to_value(line).unwrap_or(Value::Null)
 }
 
-pub(super) fn instantiate(
-    name: &str,
-    task: &Task,
-) -> Result<elbowroom_model::ground::Action, String> {
+/// Returns the action of a task with this name, `(drive a b)`.
+///
+/// # Errors
+/// The mistake, in words.
+pub fn action_named(name: &str, task: &Task) -> Result<elbowroom_model::ground::Action, String> {
     let mut words = name.trim_matches(['(', ')']).split_whitespace();
     let problem = task.problem();
     let schema = words.next().and_then(|word| problem.schema(word));

@@ -3,10 +3,9 @@
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 
-use elbowroom_model::ground::{Action, Expression as GroundExpression};
 use elbowroom_model::problem::{
-    Body, Change, Comparison, Effect, Expression, Fluent, Function, FunctionId, Guard, Metric,
-    Problem, SchemaId, TimedChange, TimedInitial, UpdateOperator,
+    Body, Change, Effect, Expression, Fluent, Function, FunctionId, Guard, Metric, Problem,
+    SchemaId, TimedChange, TimedInitial, UpdateOperator,
 };
 use elbowroom_model::{Situation, Task};
 use elbowroom_num::Rational;
@@ -288,15 +287,4 @@ pub(super) fn to_millionths(number: f64) -> i64 {
     )]
     let whole = (number * 1e6).round() as i64;
     whole
-}
-
-/// Returns the duration if the domain fixes it to a number.
-pub(super) fn duration_fixed_by_domain(action: &Action) -> Option<Rational> {
-    let [only] = action.durative()?.duration.as_slice() else {
-        return None;
-    };
-    match (&only.comparison, &only.bound) {
-        (Comparison::Equal, GroundExpression::Constant(value)) => Some(value.clone()),
-        _ => None,
-    }
 }

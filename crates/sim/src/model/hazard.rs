@@ -4,7 +4,7 @@ use elbowroom_model::Problem;
 use elbowroom_model::problem::{ObjectId, Predicate};
 
 use super::WorldModel;
-use crate::pattern::ActionPattern;
+use elbowroom_model::pattern::ActionPattern;
 
 /// Rates of spontaneous changes of facts, per second.
 ///

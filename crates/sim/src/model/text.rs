@@ -6,13 +6,14 @@ mod hazards;
 mod section;
 
 use elbowroom_model::Problem;
+use elbowroom_model::pattern::ActionPattern;
 use elbowroom_num::Rational;
 use elbowroom_text::{Diagnostic, Severity, Source, Span};
 use toml::Spanned;
 
 use super::{Amount, ExogenousChange, ExogenousEvent, ReportReliability, Rule, WorldModel};
 use crate::draw::Distribution;
-use crate::pattern::{ActionPattern, NameKind};
+use crate::pattern::{NameKind, read_pattern};
 use section::{File, Section, Shape};
 
 /// A distribution with its position, its minimum and its maximum.
@@ -82,7 +83,7 @@ impl Reader<'_> {
     }
 
     fn pattern(&self, text: &Spanned<String>, names: NameKind) -> Read<ActionPattern> {
-        ActionPattern::read(text.get_ref(), names, self.problem)
+        read_pattern(text.get_ref(), names, self.problem)
             .map_err(|problem| self.error_at(&text.span(), problem))
     }
 

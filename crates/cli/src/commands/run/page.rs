@@ -2,8 +2,7 @@
 
 use std::sync::Arc;
 
-use elbowroom::execute::RunSpec;
-use elbowroom::model::Task;
+use elbowroom::execute::RunInputs;
 use elbowroom_executive::Error;
 use elbowroom_executive::api::{self, ApiRouter};
 use elbowroom_executive::operator::OperatorInterface;
@@ -26,8 +25,7 @@ impl Page {
     /// When the token cannot be read, or the address is not available.
     pub(super) fn open(
         arguments: &RunArgs,
-        spec: &RunSpec,
-        task: &Arc<Task>,
+        inputs: &RunInputs,
         interrupt: &Interrupt,
     ) -> Result<Self, Error> {
         let Some(address) = arguments.serve else {
@@ -43,7 +41,7 @@ impl Page {
             ""
         };
         let router = api::serve(address, None, control, None)?;
-        let operator = router.begin_run(spec, task)?;
+        let operator = router.begin_run(inputs)?;
         let own = router.address();
         output::print_to_stderr(&format!("the run is shown at http://{own}/{with_token}"));
         let router = Some(router);

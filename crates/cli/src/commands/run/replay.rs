@@ -35,20 +35,20 @@ pub(super) fn run(path: &Path, as_json: bool, output: &mut Output) -> Answer {
         ));
     }
     let task = Arc::new(super::task(&spec, output)?);
+    let unusable = |error: SpecError| unreadable(format!("line 1: {error}"));
+    let inputs = RunInputs::of(spec, task, &WorldNames::default()).map_err(unusable)?;
+    let (spec, task) = (inputs.spec(), inputs.task());
     let snapshot = stored.snapshot();
     let snapshot = snapshot.map_err(|error| unreadable(error.to_string()))?;
-    let stand = snapshot.map(|it| it.restored(&task)).transpose();
+    let stand = snapshot.map(|it| it.restored(task)).transpose();
     let stand = stand.map_err(|why| unreadable(format!("line 2: {why}")))?;
     let first = if spec.has_plan {
-        let first = stored.first_plan(&task);
+        let first = stored.first_plan(task);
         first.map_err(|error| unreadable(error.to_string()))?
     } else {
         None
     };
-    let mut replay = Replay::new(&stored, Arc::clone(&task));
-    let unusable = |error: SpecError| unreadable(format!("line 1: {error}"));
-    let inputs = RunInputs::of(spec, Arc::clone(&task), &WorldNames::default());
-    let inputs = inputs.map_err(unusable)?;
+    let mut replay = Replay::new(&stored, Arc::clone(task));
     let mut watch = StoredInterrupt(replay.interruption());
     let execution = inputs
         .execution()
@@ -59,7 +59,7 @@ pub(super) fn run(path: &Path, as_json: bool, output: &mut Output) -> Answer {
         .with_planner(ReplayPlanner::new(&stored))
         .with_preparer(ReplayPreparer(inputs.preparer()))
         .recorded_by(&mut replay);
-    let mut world = ReplayWorld::new(&stored, &task);
+    let mut world = ReplayWorld::new(&stored, task);
     let outcome = execute(&inputs, execution, &mut world, &mut watch).map_err(unusable)?;
     let (agreed, difference) = replay.outcome();
     if as_json {

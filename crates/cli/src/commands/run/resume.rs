@@ -4,8 +4,7 @@ use std::cell::OnceCell;
 use std::path::Path;
 use std::sync::Arc;
 
-use elbowroom::execute::{RunInputs, RunSpec, WorldNames};
-use elbowroom::model::Task;
+use elbowroom::execute::{RunInputs, WorldNames};
 use elbowroom_executive::Error;
 use elbowroom_executive::journal::Segments;
 use elbowroom_executive::operator::OperatorInterface;
@@ -38,14 +37,13 @@ fn journaled_run(path: &Path) -> Result<JournaledRun, Failure> {
 
 /// Part of the command that supports operators of a resumed run.
 pub(in crate::commands) trait ResumeHost {
-    /// Returns the operators' interface to a run of this specification.
+    /// Returns the operators' interface to a run of these inputs.
     ///
     /// # Errors
     /// When the command does not support such a run.
     fn operator(
         &self,
-        spec: &RunSpec,
-        task: &Arc<Task>,
+        inputs: &RunInputs,
         interrupt: &Interrupt,
     ) -> Result<OperatorInterface, Error>;
 
@@ -78,10 +76,10 @@ impl<'a> StandaloneHost<'a> {
 impl ResumeHost for StandaloneHost<'_> {
     fn operator(
         &self,
-        spec: &RunSpec,
-        task: &Arc<Task>,
+        inputs: &RunInputs,
         interrupt: &Interrupt,
     ) -> Result<OperatorInterface, Error> {
+        let spec = inputs.spec();
         if spec.is_persistent {
             return Err(Error::new(
                 "this is the journal of an executive (`elbowroom serve`)",
@@ -94,7 +92,7 @@ impl ResumeHost for StandaloneHost<'_> {
                 "give --serve and --token again",
             ));
         }
-        let page = Page::open(self.arguments, spec, task, interrupt)?;
+        let page = Page::open(self.arguments, inputs, interrupt)?;
         Ok(self.page.get_or_init(|| page).operator.clone())
     }
 }

@@ -106,6 +106,7 @@ pub(in crate::commands) fn of(
         Some(FirstPlanChoice::Likeliest) => FirstPlan::Likeliest,
         None => spec.usual_first_plan(),
     };
+    spec.plans_believed_durations = spec.usual_durations();
     spec.plans_in_background = spec.can_plan_in_background();
     spec.prepares_in_background = spec.plans_in_background;
     Ok((spec, names))

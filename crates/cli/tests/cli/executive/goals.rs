@@ -187,7 +187,8 @@ fn closed_and_queued_goals_survive_rotation_and_crash() {
     let journal = place.join("journal").display().to_string();
     let line = with_robot(&place, &journal);
     let line: Vec<&str> = line.iter().map(String::as_str).collect();
-    let mut own = Executive::start(&place, &[&line[..], &["--journal-size", "1K"]].concat());
+    let segments = ["--journal-size", "1K", "--journal-segments", "1000"];
+    let mut own = Executive::start(&place, &[&line[..], &segments].concat());
     own.await_state(|state| state["why"] == "reached: problem");
     let later = json!({"name": "later", "goal": "(done a1)", "after": 1_000_000, "by": "night"});
     assert_eq!(own.post("/v1/goals", &later).0, 200);
@@ -196,7 +197,9 @@ fn closed_and_queued_goals_survive_rotation_and_crash() {
         let second = text.lines().nth(1).unwrap_or_default();
         second.contains("\"closed\"") && second.contains("\"problem\"") && second.contains("night")
     };
+    let mut given = 0;
     for number in 0.. {
+        given = number + 1;
         // The journal is rotated when its length has doubled.
         assert!(number < 200, "the journal is not rotated");
         let goal = json!({"name": format!("more-{number}"), "goal": "(done a2)"});
@@ -218,9 +221,87 @@ fn closed_and_queued_goals_survive_rotation_and_crash() {
         (&json!("queued"), &json!("night")),
         "{goal}"
     );
+    assert!(goal["given"]["decimal"].is_number(), "{goal}");
+    assert_history(&own, given);
     let replayed = command::elbowroom(&["run", "--replay", &journal]);
     assert_eq!(replayed.status.code(), Some(0), "{replayed:?}");
     std::fs::remove_dir_all(&place).expect("the folder is there");
+}
+
+/// Checks that the pages of the history have the goal of the problem, `more` other goals, and all actions, each once and
+/// the latest first.
+fn assert_history(own: &Executive, more: usize) {
+    let (mut goals, mut tickets, mut latest) = (Vec::new(), Vec::new(), f64::INFINITY);
+    let mut path = "/v1/history?limit=3".to_owned();
+    loop {
+        let (status, page) = own.get(&path);
+        assert_eq!(status, 200, "{page}");
+        let (closed, ended) = (page["goals"].as_array(), page["actions"].as_array());
+        let times = closed.into_iter().flatten().map(|it| &it["since"]);
+        let times = times.chain(ended.into_iter().flatten().map(|it| &it["end"]));
+        let times: Vec<f64> = times.map(super::exact).collect();
+        assert!(times.iter().all(|time| *time < latest), "{latest}: {page}");
+        latest = times.into_iter().fold(latest, f64::min);
+        goals.extend(closed.into_iter().flatten().map(|it| it["name"].clone()));
+        tickets.extend(
+            ended
+                .into_iter()
+                .flatten()
+                .map(|it| it["ticket"].as_u64().expect("a ticket")),
+        );
+        let Some(next) = page["next"]["exact"].as_str() else {
+            break;
+        };
+        path = format!("/v1/history?limit=3&before={next}");
+    }
+    let mut expected: Vec<Value> = (0..more)
+        .map(|number| json!(format!("more-{number}")))
+        .collect();
+    expected.push(json!("problem"));
+    goals.sort_by_key(Value::to_string);
+    expected.sort_by_key(Value::to_string);
+    assert_eq!(goals, expected);
+    tickets.sort_unstable();
+    let all: Vec<u64> = (0..tickets.len() as u64).collect();
+    assert!(tickets.len() >= 6 && tickets == all, "{tickets:?}");
+    let told = ctl(&["--to", &own.address(), "history", "--limit", "1000"]);
+    let text = String::from_utf8_lossy(&told.stdout).into_owned();
+    assert!(
+        text.contains("more-0: achieved") && text.contains("(do "),
+        "{text}"
+    );
+    for wrong in ["limit=0", "before=soon", "after=1"] {
+        assert_eq!(own.get(&format!("/v1/history?{wrong}")).0, 422);
+    }
+}
+
+#[test]
+fn goals_to_keep_are_given_by_the_command() {
+    let own = simulated("keep");
+    let (token, address) = (own.token(), own.address());
+    let line = ["goal", "(done a1)", "--name", "always", "--keep", "--wait"];
+    let told = ctl(&[&line[..], &["--token", &token, "--to", &address]].concat());
+    assert_eq!(told.status.code(), Some(0), "{told:?}");
+    let text = String::from_utf8_lossy(&told.stdout).into_owned();
+    assert!(text.contains("always, to be kept: kept since"), "{text}");
+    // When the fact is reported to be lost, it cannot be achieved again: the errand is no longer open.
+    assert_eq!(
+        own.post("/v1/facts", &json!({"fact": "(open a1)", "becomes": false}))
+            .0,
+        200
+    );
+    assert_eq!(
+        own.post("/v1/facts", &json!({"fact": "(done a1)", "becomes": false}))
+            .0,
+        200
+    );
+    own.await_state(|state| {
+        let goals = state["goals"].as_array().expect("goals");
+        let kept = goals.iter().find(|goal| goal["name"] == "always");
+        kept.is_some_and(|goal| goal["keep"] != "kept")
+    });
+    let deadline = ctl(&["goal", "(done a1)", "--keep", "--within", "5"]);
+    assert_eq!(deadline.status.code(), Some(2), "{deadline:?}");
 }
 
 #[test]
@@ -302,4 +383,40 @@ fn goals_that_exclude_each_other_are_named() {
         why.contains("`(home)` and `(there)` exclude each other"),
         "{why}"
     );
+}
+
+#[test]
+fn hypothetical_goals_are_answered_and_not_given() {
+    let own = simulated("what-if");
+    own.await_state(|state| state["activity"] == "resting");
+    let (credentials, address) = (own.token(), own.address());
+    let executive = ["--token", &credentials, "--to", &address];
+    let ask = |question: &[&str]| ctl(&[&["what-if"], &executive[..], question].concat());
+    let told = ask(&["(not (open a1))"]);
+    assert_eq!(told.status.code(), Some(1), "{told:?}");
+    assert!(told.stdout.starts_with(b"impossible"), "{told:?}");
+    let told = ask(&["(done a1)"]);
+    assert_eq!(told.status.code(), Some(0), "{told:?}");
+    assert!(told.stdout.starts_with(b"done at "), "{told:?}");
+    let before = own.get("/v1/goals");
+    let (status, answer) = own.post("/v1/what-if", &json!({"goal": "(done b2)", "within": 100}));
+    assert_eq!(
+        (status, &answer["verdict"]),
+        (200, &json!("achieved")),
+        "{answer}"
+    );
+    for wrong in [
+        json!({"goal": "(done"}),
+        json!({"goal": "(done b2)", "keep": true}),
+        json!({"goal": "(done b2)", "within": -1}),
+        json!({"goal": "(done b2)", "color": 1}),
+    ] {
+        let (status, refusal) = own.post("/v1/what-if", &wrong);
+        assert_eq!(status, 422, "{wrong}: {refusal}");
+    }
+    let (status, _) = own.ask("POST", "/v1/what-if", None, r#"{"goal":"(done b2)"}"#);
+    assert_eq!(status, 401);
+    assert_eq!(before, own.get("/v1/goals"));
+    let (_, taken) = own.post("/v1/goals", &json!({"goal": "(done b2)"}));
+    assert_eq!(taken["name"], "goal-1", "{taken}");
 }

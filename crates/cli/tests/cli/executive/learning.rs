@@ -138,6 +138,67 @@ fn executors_with_rollouts_pursue_changing_goals() {
     }
 }
 
+/// With the durations of the domain, the short road would be planned each time, and miss the deadline.
+#[test]
+fn every_plan_has_believed_durations_and_commands_have_those_of_the_domain() {
+    if !python_is_there() {
+        return;
+    }
+    let folder = folder("believed-plans");
+    let world = folder.join("world.toml");
+    let slow = "format = \"elbowroom-world\"\nversion = 1\n[[duration]]\naction = \"short-road\"\nconstant = 12\n\
+                [[duration]]\naction = \"long-road\"\nrelative = true\nconstant = 1.2\n";
+    fs::write(&world, slow).expect("written");
+    let (believed, process) = (
+        world.display().to_string(),
+        format!("python3 {}", roads("world.py")),
+    );
+    let (domain, problem) = (roads("domain.pddl"), roads("day.pddl"));
+    let line = [
+        &domain,
+        &problem,
+        "--world-process",
+        &process,
+        "--believed",
+        &believed,
+    ];
+    let mut own = Executive::start(&folder, &line);
+    own.await_state(|state| state["why"] == "reached: problem");
+    let reached = |name: &str| format!("reached: {name}");
+    let give = |goal: &str, name: &str| {
+        let (status, taken) = own.post("/v1/goals", &json!({"goal": goal, "name": name}));
+        assert_eq!(status, 200, "{taken}");
+    };
+    give("(home)", "back");
+    own.await_state(|state| state["why"] == reached("back").as_str());
+    give("(delivered)", "parcel");
+    let state = own.await_state(|state| state["running"][0]["action"] == "(long-road)");
+    assert_eq!(state["running"][0]["planned"]["exact"], "6", "{state}");
+    let (_, guarantee) = own.get("/v1/guarantee");
+    assert_eq!(guarantee["durations"], "believed", "{guarantee}");
+    own.await_state(|state| state["why"] == reached("parcel").as_str());
+    own.post("/v1/stop", &Value::Null);
+    let done = own.end();
+    assert_eq!(done.status.code(), Some(0), "{done:?}");
+    // The world received the duration of the domain, which took as long as that.
+    let trace = folder.join("trace.jsonl");
+    let lines = fs::read_to_string(&trace).expect("a trace");
+    let lines = lines
+        .lines()
+        .map(|line| serde_json::from_str::<Value>(line).expect("JSON"));
+    let commands: Vec<Value> = lines
+        .filter(|line| line["command"]["action"] == "(long-road)")
+        .collect();
+    assert_eq!(commands.len(), 2, "{commands:?}");
+    for command in commands {
+        assert_eq!(command["command"]["duration"]["exact"], "5", "{command}");
+        assert_eq!(command["expected"]["exact"], "6", "{command}");
+    }
+    let trace = trace.display().to_string();
+    let replay = command::elbowroom(&["run", "--replay", &trace]);
+    assert_eq!(replay.status.code(), Some(0), "{replay:?}");
+}
+
 #[test]
 fn stopped_executives_learn_from_the_whole_journal() {
     if !python_is_there() {

@@ -10,7 +10,7 @@ use elbowroom_model::ground::{Action, Body, Change, Effect, FactId};
 use elbowroom_num::Rational;
 use elbowroom_pddl::read_problem;
 use elbowroom_report::trace::schema::{IssuedCommandLine, ObservationLine};
-use elbowroom_report::trace::{Line, Stored};
+use elbowroom_report::trace::{Line, Stored, action_named};
 use elbowroom_sim::WorldModel;
 use elbowroom_text::Source;
 
@@ -63,6 +63,7 @@ impl FactHistory {
             started: BTreeMap::new(),
             failures: Vec::new(),
             last_failure: (Rational::ZERO, BTreeSet::new()),
+            unsettled: BTreeSet::new(),
         };
         for line in &trace.lines {
             follower.follow(line);
@@ -181,6 +182,8 @@ struct TraceReplay {
     /// The time of the last failure, and the facts that the start of this action had changed. A
     /// fact that the failure restores has not changed by itself.
     last_failure: (Rational, BTreeSet<FactId>),
+    /// Facts that cancelled actions may have changed, and that were not reported since.
+    unsettled: BTreeSet<FactId>,
 }
 
 impl TraceReplay {
@@ -193,7 +196,7 @@ impl TraceReplay {
                     action,
                     duration,
                 } = &line.command
-                    && let Some(action) = self.action(action)
+                    && let Ok(action) = action_named(action, &self.task)
                 {
                     let duration = duration.as_ref().map(|duration| duration.0.clone());
                     self.commanded.insert(*ticket, (Arc::new(action), duration));
@@ -208,14 +211,6 @@ impl TraceReplay {
             Line::Over(line) => self.advance_to(&line.time),
             _ => {}
         }
-    }
-
-    fn action(&self, name: &str) -> Option<Action> {
-        let mut words = name.trim_matches(['(', ')']).split_whitespace();
-        let problem = self.task.problem();
-        let schema = problem.schema(words.next()?)?;
-        let objects: Option<Vec<_>> = words.map(|word| problem.object(word)).collect();
-        self.task.instantiate(schema, &objects?).ok()
     }
 
     fn observe(&mut self, observation: &ObservationLine) {
@@ -265,6 +260,10 @@ impl TraceReplay {
                     self.last_failure = (time.0.clone(), BTreeSet::new());
                 }
                 self.last_failure.1.extend(affected_facts(&action, true));
+                if outcome == "cancelled" {
+                    self.unsettled.extend(affected_facts(&action, true));
+                    self.unsettled.extend(affected_facts(&action, false));
+                }
             }
             ObservationLine::Fact {
                 fact,
@@ -275,13 +274,15 @@ impl TraceReplay {
                 let Some(fact) = self.task.fact_named(fact) else {
                     return;
                 };
+                // The first report after a cancellation is about the state in which it left the fact.
+                let is_settled = !self.unsettled.remove(&fact);
                 if self.state.fact(fact) == *becomes {
                     return;
                 }
                 self.state.change_fact(fact, *becomes);
                 let is_undone =
                     self.last_failure.0 == time.0 && self.last_failure.1.contains(&fact);
-                self.record_change(fact, &time.0, !is_undone);
+                self.record_change(fact, &time.0, is_settled && !is_undone);
                 let state = &self.state;
                 let now = self.failures.iter_mut().rev();
                 for failed in now.take_while(|failed| failed.at == time.0) {
@@ -331,6 +332,7 @@ impl TraceReplay {
         let before: Vec<bool> = facts.iter().map(|fact| self.state.fact(*fact)).collect();
         what(&mut self.state);
         for (fact, before) in facts.iter().zip(before) {
+            self.unsettled.remove(fact);
             if self.state.fact(*fact) != before {
                 self.record_change(*fact, at, false);
             }

@@ -21,7 +21,7 @@ use elbowroom_text::Diagnostic;
 
 use super::{AdversaryError, EMBEDDED, FirstPlanError, NO_PLANNER, RunSpec, SpecError};
 use crate::execute::{
-    AdversarialWorld, Embedded, Execution, External, FirstPlan, MostProbablePlanner, PlanPreparer,
+    AdversarialWorld, Embedded, Execution, External, MostProbablePlanner, PlanPreparer,
     PlanSelector, Replanning, RolloutPolicy, Rollouts, SelectingPlanner, SharedRolloutPolicy,
     WorldKnowledge, planning_work,
 };
@@ -30,14 +30,16 @@ use crate::{DistributionError, parse_box, pipeline};
 /// The time limit of another planner for its first plan.
 const FIRST_PLAN_TIME_LIMIT: Duration = Duration::from_secs(60);
 
-/// The inputs of a run: its specification, with the problem, worlds and likelihoods read from its texts, each once.
+/// The inputs of a run: its specification, with the problem, worlds and likelihoods read from its texts, each once. The
+/// problem has the durations of plans: those of the domain, or the means of the believed world
+/// ([`RunSpec::plans_believed_durations`]).
 #[derive(Clone, Debug)]
 pub struct RunInputs {
     spec: RunSpec,
     task: Arc<Task>,
     /// The simulated world; `None` if the world is a process.
     simulation: Option<WorldModel>,
-    /// The world that the executor believes, if any.
+    /// The world that the executor believes, if any, around the durations of plans.
     beliefs: Option<WorldModel>,
     likelihoods: Arc<Likelihoods>,
 }
@@ -68,17 +70,15 @@ impl RunInputs {
     /// # Errors
     /// When a text cannot be read.
     pub fn read(spec: RunSpec) -> Result<(Self, Vec<Diagnostic>), SpecError> {
-        let read = elbowroom_pddl::read_problem(&spec.domain.source(), &spec.problem.source());
-        let (problem, warnings) = read.map_err(SpecError::Problem)?;
-        let task = Task::new(problem).with_epsilon(spec.epsilon.clone());
+        let (task, warnings) = spec.read_task().map_err(SpecError::Problem)?;
         Ok((
             Self::of(spec, Arc::new(task), &WorldNames::default())?,
             warnings,
         ))
     }
 
-    /// Reads the likelihoods and the worlds of a specification, whose problem was read already. `names` are those of
-    /// the world files, for messages.
+    /// Reads the likelihoods and the worlds of a specification, whose problem was read already, with the durations of
+    /// the domain. `names` are those of the world files, for messages.
     ///
     /// # Errors
     /// When a text cannot be read.
@@ -93,6 +93,7 @@ impl RunInputs {
                 .beliefs(problem, &names.believed)
                 .map_err(SpecError::World)?,
         };
+        let (task, beliefs) = spec.with_durations(task, beliefs);
         Ok(Self {
             spec,
             task,
@@ -102,12 +103,29 @@ impl RunInputs {
         })
     }
 
+    /// Returns the inputs for a simulation of the same run, in which planning takes no time. `task` is its problem, for
+    /// example with another goal or table of facts.
+    #[must_use]
+    pub fn without_planning_time(&self, task: Arc<Task>) -> Self {
+        let spec = RunSpec {
+            planning_time: PlanningTime::Seconds(Rational::ZERO),
+            plans_in_background: false,
+            prepares_in_background: false,
+            ..self.spec.clone()
+        };
+        Self {
+            spec,
+            task,
+            ..self.clone()
+        }
+    }
+
     /// Returns the specification.
     pub fn spec(&self) -> &RunSpec {
         &self.spec
     }
 
-    /// Returns the problem, with the ε of the specification.
+    /// Returns the problem, with the ε of the specification and the durations of plans.
     pub fn task(&self) -> &Arc<Task> {
         &self.task
     }
@@ -293,6 +311,7 @@ impl RunInputs {
             .with_settings(spec.settings())
             .persistent(spec.is_persistent)
             .interactive(spec.is_interactive)
+            .with_domain_commands(task.has_expected_durations())
             .with_envelopes(self.envelopes())
             .with_likelihoods(Arc::clone(&self.likelihoods))
             .with_plan_comparator(odds)
@@ -325,19 +344,6 @@ impl RunInputs {
 }
 
 impl RunSpec {
-    /// Returns the default criterion for a first plan: its probability, if the embedded planner
-    /// makes it and there is a model of the world or of likelihoods; otherwise, its makespan or
-    /// metric.
-    pub fn usual_first_plan(&self) -> FirstPlan {
-        let is_known = self.believed_world().is_some() || self.likelihoods.is_some();
-        let is_embedded = self.planner.eq_ignore_ascii_case(EMBEDDED);
-        if is_known && is_embedded && !self.has_plan && !self.is_persistent {
-            FirstPlan::Likeliest
-        } else {
-            FirstPlan::Shortest
-        }
-    }
-
     /// Returns the planner that [`Self::planner`] names, with the limits of the run, and with
     /// `clock` and `may_continue` as in [`Embedded`]. For executors that compare plans, it returns the likeliest plan in the
     /// world of `model`. It does not choose among plans for the first one.
@@ -420,6 +426,7 @@ impl RunSpec {
     /// When they are inconsistent.
     pub fn check(&self) -> Result<(), SpecError> {
         self.check_planner()?;
+        self.check_durations()?;
         let whom = self.planner_choice()?;
         if !self.first_plan.is_shortest() {
             let is_known = self.believed_world().is_some() || self.likelihoods.is_some();
@@ -476,15 +483,6 @@ impl RunSpec {
                 .as_ref()
                 .map_or(CERTIFICATE_WORK, certificate_work),
             ..Embedded::default()
-        }
-    }
-
-    /// Returns the expected planning time in the world; 0 if it is measured, because it is not
-    /// known in advance.
-    fn expected_planning_time(&self) -> Rational {
-        match &self.planning_time {
-            PlanningTime::Seconds(seconds) => seconds.clone(),
-            PlanningTime::Measured => Rational::ZERO,
         }
     }
 }

@@ -52,6 +52,12 @@ pub enum SpecError {
     /// The most likely box was requested, but there is no model of the world.
     #[error(transparent)]
     Distribution(#[from] DistributionError),
+    /// Plans were requested with the durations of a believed world, but there is no such world, or a planner that does
+    /// not use it.
+    #[error(
+        "plans have believed durations only if there is a believed world and the embedded planner makes all plans"
+    )]
+    BelievedDurations,
     /// A simulation was requested, but the world is a process.
     #[error("the world is a process; it cannot be simulated")]
     Process,

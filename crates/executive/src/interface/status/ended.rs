@@ -11,7 +11,7 @@ use super::super::documents::{EndedAction, Running};
 const MAX_ENDED: usize = 50;
 
 /// List of the actions that ended last, oldest first.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct EndedActions(VecDeque<EndedAction>);
 
 impl EndedActions {

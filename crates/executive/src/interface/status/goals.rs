@@ -85,8 +85,16 @@ impl GoalList {
             .min()
     }
 
-    /// Returns the closed goals, for a snapshot.
-    pub(super) fn closed(&self) -> Vec<ClosedGoalLine> {
+    /// Adds the closed goals to a snapshot, and the times at which the open ones were given.
+    pub(super) fn complete(&self, snapshot: &mut SnapshotLine) {
+        for line in snapshot.goals.iter_mut().chain(&mut snapshot.queued) {
+            let known = self.open.iter().find(|goal| goal.name == line.name);
+            line.given = known.and_then(|goal| goal.given.clone());
+        }
+        snapshot.closed = self.closed_lines();
+    }
+
+    fn closed_lines(&self) -> Vec<ClosedGoalLine> {
         let lines = self.closed.iter().map(|goal| ClosedGoalLine {
             name: goal.name.clone(),
             goal: goal.goal.clone(),
@@ -101,6 +109,11 @@ impl GoalList {
             why: goal.why.clone(),
         });
         lines.collect()
+    }
+
+    /// Removes and returns the closed goals.
+    pub(super) fn take_closed(&mut self) -> Vec<GoalNow> {
+        std::mem::take(&mut self.closed).into()
     }
 
     /// Returns the open goal of that name, or otherwise the last closed one.
@@ -128,7 +141,7 @@ impl GoalList {
             keep: line.keep,
             by: line.by.clone(),
             state,
-            given: None,
+            given: line.given.clone(),
             since: Exact(snapshot.now().clone()),
             why,
         };

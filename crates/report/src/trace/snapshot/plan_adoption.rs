@@ -87,6 +87,9 @@ pub struct GoalLine {
     /// Name of the client that has given it, if it is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub by: Option<String>,
+    /// The time at which it was given, for clients; the run does not read it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub given: Option<Exact>,
     /// The reason for which it is set aside while others are pursued; `None` if it is pursued.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub aside: Option<String>,
@@ -202,6 +205,7 @@ pub(super) fn goal_lines(goals: &[GivenGoal]) -> Vec<GoalLine> {
             release,
             keep,
             by,
+            given: None,
             aside: given.set_aside.clone(),
             late: given.missed_deadline.clone(),
             waits: WaitLine::of(given.wait),

@@ -10,7 +10,7 @@ use elbowroom_num::Rational;
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
-use super::super::replay::instantiate;
+use super::super::replay::action_named;
 use super::fluent;
 use crate::exact::Exact;
 
@@ -161,7 +161,7 @@ impl StartLine {
         };
         Ok(KnownStart {
             ticket: ActionHandle(self.ticket),
-            action: Arc::new(instantiate(&self.action, task)?),
+            action: Arc::new(action_named(&self.action, task)?),
             planned: to_rational(self.duration.as_ref()),
             commanded: self.ordered.0.clone(),
             started: to_rational(self.started.as_ref()),

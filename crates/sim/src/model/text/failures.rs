@@ -1,5 +1,6 @@
 //! Failures of actions, and their outcomes.
 
+use elbowroom_model::pattern::ActionPattern;
 use elbowroom_model::problem::{Schema, TypeId, Variable};
 use elbowroom_num::Rational;
 use toml::Spanned;
@@ -8,7 +9,7 @@ use super::section::{OutcomeSection, Section};
 use super::{Read, Reader};
 use crate::model::outcome::TemplateArgument;
 use crate::model::{FactOutcome, FailureRule, FailureTime, Outcome, OutcomeChange, Template};
-use crate::pattern::{ActionPattern, NameKind};
+use crate::pattern::{NameKind, read_pattern};
 
 /// Operation of a number on a fluent.
 #[derive(Clone, Copy)]
@@ -162,7 +163,7 @@ impl Reader<'_> {
         // Checks that the predicate or function exists, with that number of arguments.
         let blanks = vec!["_"; words.len()].join(" ");
         let pattern = format!("({name} {blanks})");
-        ActionPattern::read(&pattern, names, self.problem)
+        read_pattern(&pattern, names, self.problem)
             .map_err(|problem| self.error_at(&text.span(), problem))?;
         let parameters = self.parameters(&name, names);
         let schema = self.schema_of(action);
