@@ -66,13 +66,18 @@ impl Sources {
     }
 }
 
+fn describe_constraint(mission: &PreparedPlan, index: usize) -> Evidence {
+    let plan = &mission.plan.plan;
+    explain::describe_constraint(&mission.task, plan, &mission.origin, index)
+}
+
 /// Returns the reason for rejecting a plan whose network is not controllable: the conflicting
 /// constraints.
 fn contradiction(mission: &PreparedPlan, sources: &Sources, behind: &[NetworkLimit]) -> Reason {
     let mut reason = Reason::new(Cause::Late).about(Subject::NoSchedule);
     let indices = behind.iter().filter_map(|behind| sources.of(*behind));
     reason.evidence = indices
-        .map(|index| explain::describe_constraint(&mission.task, &mission.plan.plan, index))
+        .map(|index| describe_constraint(mission, index))
         .collect();
     reason.evidence.dedup();
     reason
@@ -165,7 +170,7 @@ impl Dispatch {
             .uncertain_network(reading)
             .map_err(|Impossible(index)| {
                 let mut reason = Reason::new(Cause::Late).about(Subject::UnsatisfiableConstraint);
-                reason.evidence = vec![explain::describe_constraint(&mission.task, plan, index)];
+                reason.evidence = vec![describe_constraint(mission, index)];
                 Box::new(reason)
             })?;
         let sources = Sources {
@@ -191,8 +196,7 @@ impl Dispatch {
     ) -> Result<(), Vec<Evidence>> {
         let known = self.plan.constraints.len();
         let network = self.remaining_network(now, reading);
-        let named = |index: usize| explain::describe_constraint(&self.task, &self.plan, index);
-        let network = network.map_err(|Impossible(index)| vec![named(index)])?;
+        let network = network.map_err(|Impossible(index)| vec![self.describe_constraint(index)])?;
         let own = |index: &usize| *index < known;
         let sources = Sources {
             requirements: network
@@ -207,7 +211,7 @@ impl Dispatch {
             let mut behind: Vec<Evidence> = constraints_of_steps(&conflict.steps)
                 .iter()
                 .filter_map(|limit| sources.of(*limit))
-                .map(named)
+                .map(|index| self.describe_constraint(index))
                 .collect();
             behind.dedup();
             behind

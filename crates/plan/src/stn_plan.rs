@@ -302,18 +302,22 @@ impl StnPlan {
         }
     }
 
-    /// Returns the node in words: `start of (move a b)`, `(open w) becomes false`.
+    /// Returns the node in words: `start of (move a b)`, `timed initials at 5`.
     pub fn describe_node(&self, task: &Task, node: NodeId) -> String {
+        self.describe_node_from(task, node, &Rational::ZERO)
+    }
+
+    /// Like [`StnPlan::describe_node`]; the times of timed initials are on a clock that reads
+    /// `origin` when the task's clock reads 0.
+    pub fn describe_node_from(&self, task: &Task, node: NodeId, origin: &Rational) -> String {
         match self.nodes[node.index()] {
             Node::Zero => "the beginning of the plan".to_owned(),
             Node::Start(id) => format!("start of {}", self.instance(id).action.name),
             Node::End(id) => format!("end of {}", self.instance(id).action.name),
             Node::Instant(id) => self.instance(id).action.name.clone(),
             Node::Timed(index) => {
-                format!(
-                    "timed initials at {}",
-                    task.timed()[index].time.to_decimal(3)
-                )
+                let time = origin + &task.timed()[index].time;
+                format!("timed initials at {}", time.to_decimal(3))
             }
         }
     }

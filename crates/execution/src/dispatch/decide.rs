@@ -96,7 +96,7 @@ impl Dispatch {
         let mut reason = Reason::new(Cause::NothingDue);
         reason.about = Some(match &wake {
             Some((_, node)) => {
-                let words = self.plan.describe_node(&self.task, *node);
+                let words = self.describe_node(*node);
                 let failures = self.failure_subject(*node, Some(words.clone()));
                 failures.unwrap_or(Subject::TimePoint(words))
             }
@@ -225,7 +225,7 @@ impl Dispatch {
             reason.allowed = Some(explain::interval(&self.durations[id.index()]));
             reason
         } else {
-            let words = self.plan.describe_node(&self.task, node);
+            let words = self.describe_node(node);
             Reason::new(Cause::Unreachable).about(Subject::TimePoint(words))
         };
         reason.action = awaited.map(|id| self.action(id).name.clone());

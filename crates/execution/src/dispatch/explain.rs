@@ -12,19 +12,25 @@ use crate::window_propagation::NetworkLimit;
 /// Number of constraints of a long chain that are named.
 const MAX_NAMED_CONSTRAINTS: usize = 4;
 
-/// Describes a constraint of a plan; a timed initial without its time.
-pub(super) fn describe_constraint(task: &Task, plan: &StnPlan, index: usize) -> Evidence {
+/// Describes a constraint of a plan whose clock reads 0 at `origin` on the world's clock.
+pub(super) fn describe_constraint(
+    task: &Task,
+    plan: &StnPlan,
+    origin: &Rational,
+    index: usize,
+) -> Evidence {
     let constraint = &plan.constraints[index];
     if let elbowroom_plan::Reason::Timed(timed) = constraint.reason {
+        let timed = &task.timed()[timed];
         return Evidence::Timed {
-            changes: TimedChange::all(task, &task.timed()[timed].changes),
-            at: None,
+            changes: TimedChange::all(task, &timed.changes),
+            at: Some(origin + &timed.time),
         };
     }
     if let Some(id) = plan.duration_of(constraint) {
         return Evidence::Duration(plan.instance(id).action.name.clone());
     }
-    let node = |id: NodeId| plan.describe_node(task, id);
+    let node = |id: NodeId| plan.describe_node_from(task, id, origin);
     Evidence::Order {
         first: node(constraint.from),
         second: node(constraint.to),
@@ -32,6 +38,16 @@ pub(super) fn describe_constraint(task: &Task, plan: &StnPlan, index: usize) -> 
 }
 
 impl Dispatch {
+    /// Describes a time point of the plan, with times on the world's clock.
+    pub(super) fn describe_node(&self, node: NodeId) -> String {
+        self.plan.describe_node_from(&self.task, node, &self.origin)
+    }
+
+    /// Describes a constraint of the plan, with times on the world's clock.
+    pub(super) fn describe_constraint(&self, index: usize) -> Evidence {
+        describe_constraint(&self.task, &self.plan, &self.origin, index)
+    }
+
     /// Returns the plan's constraints that cause one end of a node's window. Of a long chain, only
     /// both ends are returned: the origin, for example a deadline, and the constraints next to the
     /// node.
@@ -39,13 +55,7 @@ impl Dispatch {
         let limits = self.horizon.window_causes(network_node(node), end);
         let named = |limit: &NetworkLimit| {
             let index = self.sources.of(*limit)?;
-            let mut named = describe_constraint(&self.task, &self.plan, index);
-            if let (elbowroom_plan::Reason::Timed(timed), Evidence::Timed { at, .. }) =
-                (&self.plan.constraints[index].reason, &mut named)
-            {
-                *at = Some(self.to_world_time(&self.task.timed()[*timed].time));
-            }
-            Some(named)
+            Some(self.describe_constraint(index))
         };
         let mut chain: Vec<Evidence> = limits.iter().filter_map(named).collect();
         chain.dedup();
