@@ -219,12 +219,10 @@ fn snapshot(status: &Status, belief: &BeliefState, now: Rational) -> RunSnapshot
 
 /// Returns the adoption of the remaining plan; `None` if there is none, or if it does not reach its goals from here.
 fn adoption(status: &Status, belief: &BeliefState, goals: &Goals) -> Option<RunPhase> {
-    let (situation, running) = situation_at(
-        belief,
-        belief.time().clone(),
-        OverrunEstimate::QuarterLonger,
-    );
     let task = belief.task();
+    // Nothing is started before the request.
+    let start = belief.time() + task.epsilon();
+    let (situation, running) = situation_at(belief, start, OverrunEstimate::QuarterLonger);
     let left = status
         .plan()
         .steps

@@ -172,15 +172,20 @@ fn executed(
     (trace, answers, status)
 }
 
-/// Moments while actions are running, between two starts, and while the run is idle.
+/// Moments while actions are running, between an end and the next start, and while the run is idle. None of them is
+/// the planned end of an action: before the report of such an end, the action counts as late.
 fn moments() -> Vec<Rational> {
     [
         (1, 2),
         (1, 1),
-        (2, 1),
+        (3, 2),
+        (4001, 2000),
         (5, 2),
+        (3, 1),
         (7, 2),
+        (4501, 1000),
         (5, 1),
+        (11, 2),
         (9, 1),
         (20, 1),
         (27, 1),
