@@ -110,10 +110,12 @@ pub(crate) fn time_triggered(
 
 /// Prints advice on an invalid plan to standard error.
 pub(crate) fn advise_repair() {
-    output::print_to_stderr(&format!(
-        "{}: `elbowroom envelope DOMAIN PROBLEM PLAN --repair` prints the cheapest repair",
-        styled(HINT, "note"),
-    ));
+    note("`elbowroom envelope DOMAIN PROBLEM PLAN --repair` prints the cheapest repair");
+}
+
+/// Prints a note to standard error.
+pub(crate) fn note(text: &str) {
+    output::print_to_stderr(&format!("{}: {text}", styled(HINT, "note")));
 }
 
 /// Reads a trace, or another record of `what`. The checksums of a journal's lines are removed.

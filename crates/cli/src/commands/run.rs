@@ -190,6 +190,7 @@ fn show(
             && why.starts_with("the plan is not valid")
         {
             input::advise_repair();
+            input::note("without PLAN, the planner makes a plan");
         }
         Ok(())
     }

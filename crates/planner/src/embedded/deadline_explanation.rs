@@ -83,11 +83,11 @@ pub(crate) fn relaxed_proof(names: &Names, compiled: &Compiled) -> Option<Proof>
         }
         without.evaluate(&initial).is_none()
     };
-    let missing = relaxed.missing_goals();
+    let goal = in_words(names, &relaxed.missing_goals(), " and ");
     Some(build_proof(
         names,
         compiled,
-        &missing,
+        goal,
         &suspects,
         &mut fails_without,
     ))
@@ -105,7 +105,13 @@ pub(crate) fn pairs_proof(
     if !pairs.is_dead_end(&initial) {
         return None;
     }
-    let missing = pairs.missing_goals();
+    let (missing, are_together) = pairs.missing_goals();
+    let joint = if are_together {
+        " together with "
+    } else {
+        " and "
+    };
+    let goal = in_words(names, &missing, joint);
     let suspects: Vec<_> = (0..pairs.timetable_count())
         .map(|number| {
             let kept = pairs.ignore_timetable(number);
@@ -133,10 +139,22 @@ pub(crate) fn pairs_proof(
     Some(build_proof(
         names,
         compiled,
-        &missing,
+        goal,
         &suspects,
         &mut fails_without,
     ))
+}
+
+/// Returns the missing parts of the goal in words, separated by `joint`.
+fn in_words(names: &Names, missing: &[Missing], joint: &str) -> String {
+    if missing.is_empty() {
+        return "the end of a running action".to_owned();
+    }
+    let parts = missing.iter().map(|missing| match missing {
+        Missing::Literal(literal) => format!("`{}`", names.literal(*literal)),
+        Missing::Other => "a part of the goal".to_owned(),
+    });
+    parts.collect::<Vec<String>>().join(joint)
 }
 
 /// Returns the proof: the missing parts of the goal, and the deadlines without which it would be
@@ -144,22 +162,10 @@ pub(crate) fn pairs_proof(
 fn build_proof(
     names: &Names,
     compiled: &Compiled,
-    missing: &[Missing],
+    goal: String,
     suspects: &[Option<(Literal, Ticks)>],
     fails_without: &mut dyn FnMut(&[usize]) -> bool,
 ) -> Proof {
-    let goals: Vec<String> = missing
-        .iter()
-        .map(|missing| match missing {
-            Missing::Literal(literal) => format!("`{}`", names.literal(*literal)),
-            Missing::Other => "a part of the goal".to_owned(),
-        })
-        .collect();
-    let goal = if goals.is_empty() {
-        "the end of a running action".to_owned()
-    } else {
-        goals.join(" and ")
-    };
     let guilty = minimal_deadlines(suspects, fails_without);
     if guilty.is_empty() {
         return Proof::Unreachable(vec![format!("{goal} cannot be reached")]);

@@ -117,30 +117,30 @@ impl<'a> H2<'a> {
         Some((self.graph.timetable_literal(number)?, end))
     }
 
-    /// Returns the parts of the goal that are too late by themselves, or, if there are none, those
-    /// that are too late together with another. Valid after [`is_dead_end`](Self::is_dead_end) has
-    /// returned `true`.
-    pub(crate) fn missing_goals(&self) -> Vec<Missing> {
+    /// Returns the parts of the goal that are too late by themselves. If there are none, returns two
+    /// that are too late together, or those that are too late together with a running action; then
+    /// `true` is returned, too. Valid after [`is_dead_end`](Self::is_dead_end) has returned `true`.
+    pub(crate) fn missing_goals(&self) -> (Vec<Missing>, bool) {
         let goal = &self.model.goal;
         let is_late = |one: usize, other: usize| self.time[one * self.count + other] >= NEVER;
-        let alone: Vec<usize> = goal
-            .iter()
-            .copied()
-            .filter(|&atom| is_late(atom, atom))
-            .collect();
-        let late = if alone.is_empty() {
-            let with_another = |&atom: &usize| {
-                (0..self.count).any(|other| {
-                    let counts = goal.contains(&other) || other >= self.model.atom_count;
-                    counts && is_late(atom, other)
-                })
-            };
-            goal.iter().copied().filter(with_another).collect()
-        } else {
-            alone
+        let parts = |late: Vec<usize>| {
+            let literals = late.iter().map(|&atom| self.model.literals[atom]);
+            literals.map(Missing::Literal).collect()
         };
-        let literals = late.iter().map(|&atom| self.model.literals[atom]);
-        literals.map(Missing::Literal).collect()
+        let those = |is_late: &dyn Fn(usize) -> bool| -> Vec<usize> {
+            goal.iter().copied().filter(|&atom| is_late(atom)).collect()
+        };
+        let alone = those(&|atom| is_late(atom, atom));
+        if !alone.is_empty() {
+            return (parts(alone), false);
+        }
+        for &one in goal {
+            if let Some(&other) = goal.iter().find(|&&other| is_late(one, other)) {
+                return (parts(vec![one, other]), true);
+            }
+        }
+        let is_late = |atom| (self.model.atom_count..self.count).any(|other| is_late(atom, other));
+        (parts(those(&is_late)), true)
     }
 
     /// Returns `true` if no plan has this beginning: the goal, with all running actions ended, is

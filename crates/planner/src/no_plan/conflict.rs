@@ -2,6 +2,7 @@
 
 use elbowroom_model::problem::Condition;
 use elbowroom_model::{Situation, Task};
+use elbowroom_verify::no_plan::verify_no_plan_from;
 
 use super::{Effort, no_plan_certificate_within};
 
@@ -11,10 +12,10 @@ const MAX_CONJUNCTS: usize = 12;
 /// Returns conjuncts of the goal that exclude each other, in words; empty unless a certificate
 /// proves it.
 ///
-/// Conjuncts are removed one after the other, as long as a certificate for the others exists
-/// (deletion filter). So no proper subset of the result is known to be unreachable. Each of these
-/// certificates has the same share of `work`. The result is empty if a single conjunct is
-/// unreachable, or if `may_continue` returns `false`.
+/// From the conjuncts of a certified goal, one after the other is removed as long as the same
+/// certificate proves that the others are unreachable (deletion filter). So it does not prove this
+/// for any proper subset of the result. The result is empty if a single conjunct is unreachable, if
+/// the certificate takes more than `work`, or if `may_continue` returns `false`.
 pub fn conflict(
     task: &Task,
     situation: &Situation,
@@ -26,26 +27,22 @@ pub fn conflict(
     if left.len() < 2 || left.len() > MAX_CONJUNCTS {
         return Vec::new();
     }
-    let all = left.len();
-    let share = work / (all as u64 + 1);
-    let is_impossible = |task: &Task, may_continue: &mut dyn FnMut() -> bool| {
-        no_plan_certificate_within(task, situation, &mut Effort::of(share, may_continue)).is_ok()
+    let mut effort = Effort::of(work, may_continue);
+    let Ok(certificate) = no_plan_certificate_within(task, situation, &mut effort) else {
+        return Vec::new();
     };
-    let mut place = all;
-    while place > 0 {
-        place -= 1;
+    for place in (0..left.len()).rev() {
         let mut fewer = left.clone();
         fewer.remove(place);
         let part = task.with_goal(Condition::And(fewer.clone()));
-        if is_impossible(&part, may_continue) {
+        if verify_no_plan_from(&part, situation, &certificate).is_ok() {
             left = fewer;
         }
         if !may_continue() {
             return Vec::new();
         }
     }
-    let is_proved = left.len() < all || is_impossible(task, may_continue);
-    if left.len() < 2 || !is_proved {
+    if left.len() < 2 {
         return Vec::new();
     }
     let in_words = |condition: Condition| {

@@ -33,20 +33,17 @@ impl Embedded<'_> {
         if !has_none || self.certificate_work == 0 || !self.may_continue() {
             return (answer, shortfall);
         }
-        shortfall.missed_deadlines = self.missed_deadlines(task, situation);
-        if shortfall
-            .missed_deadlines
-            .iter()
-            .any(|late| late.proven_lower_bound.is_some())
-        {
-            return (PlanAnswer::Unsolvable, shortfall);
-        }
         if answer == PlanAnswer::Unsolvable {
-            let (from, work) = (
-                with_any_ends(situation),
-                self.certificate_work / LIMIT_DIVISOR,
-            );
-            shortfall.conflict = conflict(task, &from, work, &mut || self.may_continue());
+            let any_ends = with_any_ends(situation);
+            let may_continue = &mut || self.may_continue();
+            shortfall.conflict = conflict(task, &any_ends, self.certificate_work, may_continue);
+        }
+        if shortfall.conflict.is_empty() {
+            shortfall.missed_deadlines = self.missed_deadlines(task, situation);
+            let mut late = shortfall.missed_deadlines.iter();
+            if late.any(|late| late.proven_lower_bound.is_some()) {
+                return (PlanAnswer::Unsolvable, shortfall);
+            }
         }
         (answer, shortfall)
     }

@@ -108,7 +108,7 @@ fn with_fluents(task: &Task, reason: String) -> String {
     };
     let verb = if rest == 0 { "has" } else { "have" };
     format!(
-        "{reason}. {first}{others} {verb} no initial value, so nothing that reads it is possible: \
-         add `(= {first} 0)` to :init, or another value"
+        "{reason}. {first}{others} {verb} no initial value, so no action that reads it is possible \
+         before it has one. If that is not intended, add a value to :init: `(= {first} 0)`"
     )
 }
