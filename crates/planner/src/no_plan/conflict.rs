@@ -13,9 +13,11 @@ const MAX_CONJUNCTS: usize = 12;
 /// proves it.
 ///
 /// From the conjuncts of a certified goal, one after the other is removed as long as the same
-/// certificate proves that the others are unreachable (deletion filter). So it does not prove this
-/// for any proper subset of the result. The result is empty if a single conjunct is unreachable, if
-/// the certificate takes more than `work`, or if `may_continue` returns `false`.
+/// certificate proves that the others are unreachable (deletion filter). A closed set of states
+/// proves this only for the facts that its goal needs, so another one is searched for. No proper
+/// subset of the result is known to be unreachable. The result is empty if a single conjunct is
+/// unreachable, if the certificate takes more than its share of `work`, or if `may_continue`
+/// returns `false`.
 pub fn conflict(
     task: &Task,
     situation: &Situation,
@@ -27,8 +29,11 @@ pub fn conflict(
     if left.len() < 2 || left.len() > MAX_CONJUNCTS {
         return Vec::new();
     }
-    let mut effort = Effort::of(work, may_continue);
-    let Ok(certificate) = no_plan_certificate_within(task, situation, &mut effort) else {
+    let share = work / (left.len() as u64 + 1);
+    let certified = |task: &Task, may_continue: &mut dyn FnMut() -> bool| {
+        no_plan_certificate_within(task, situation, &mut Effort::of(share, may_continue)).ok()
+    };
+    let Some(mut certificate) = certified(task, may_continue) else {
         return Vec::new();
     };
     for place in (0..left.len()).rev() {
@@ -37,6 +42,10 @@ pub fn conflict(
         let part = task.with_goal(Condition::And(fewer.clone()));
         if verify_no_plan_from(&part, situation, &certificate).is_ok() {
             left = fewer;
+        } else if certificate.closed.is_some()
+            && let Some(other) = certified(&part, may_continue)
+        {
+            (certificate, left) = (other, fewer);
         }
         if !may_continue() {
             return Vec::new();

@@ -346,29 +346,26 @@ impl GoalManager<'_> {
         for goal in candidates.filter(|goal| choosing.names.contains(&goal.name)) {
             let is_aside = !pursued.contains(&goal.name);
             let position = choosing.position(&goal.name).unwrap_or_default();
+            let mut conflicts = conflicts.iter();
+            let conflict = conflicts.find(|it| it.is_excluding(&goal.name, &pursued));
+            let conflict = conflict.map(|it| format!("{} exclude each other", it.in_words()));
             let why = || match &goal.unreachable {
                 Some(why) => why.clone(),
-                None if choosing.selection.is_excluded(position) => match goal.terms.deadline {
-                    Some(_) => match &goal.missed_deadline {
-                        Some(late) => {
-                            format!(
-                                "no plan reaches it by its deadline; it would be reached {late}"
-                            )
-                        }
-                        None => "no plan reaches it by its deadline".to_owned(),
-                    },
-                    None => "no plan reaches it".to_owned(),
-                },
+                None if choosing.selection.is_excluded(position) => {
+                    match (&goal.terms.deadline, &goal.missed_deadline) {
+                        (Some(_), Some(late)) => format!(
+                            "no plan reaches it by its deadline; it would be reached {late}"
+                        ),
+                        (Some(_), None) => "no plan reaches it by its deadline".to_owned(),
+                        (None, _) => conflict.unwrap_or_else(|| "no plan reaches it".to_owned()),
+                    }
+                }
                 None if choosing.selection.is_untried(position) => {
                     format!("a plan for {list} is sought first")
                 }
-                None => match conflicts
-                    .iter()
-                    .find(|it| it.is_excluding(&goal.name, &pursued))
-                {
-                    Some(conflict) => format!("{} exclude each other", conflict.in_words()),
-                    None => format!("no plan reaches it together with {list}"),
-                },
+                None => {
+                    conflict.unwrap_or_else(|| format!("no plan reaches it together with {list}"))
+                }
             };
             goal.set_aside = is_aside.then(why);
         }
