@@ -36,16 +36,20 @@ pub fn conflict(
     let Some(mut certificate) = certified(task, may_continue) else {
         return Vec::new();
     };
-    for place in (0..left.len()).rev() {
+    // The goals given last come last, and a conflict within one of them is the best reason.
+    let mut place = 0;
+    while place < left.len() {
         let mut fewer = left.clone();
         fewer.remove(place);
         let part = task.with_goal(Condition::And(fewer.clone()));
-        if verify_no_plan_from(&part, situation, &certificate).is_ok() {
-            left = fewer;
-        } else if certificate.closed.is_some()
-            && let Some(other) = certified(&part, may_continue)
-        {
-            (certificate, left) = (other, fewer);
+        let other = match verify_no_plan_from(&part, situation, &certificate) {
+            Ok(()) => Some(certificate.clone()),
+            Err(_) if certificate.closed.is_some() => certified(&part, may_continue),
+            Err(_) => None,
+        };
+        match other {
+            Some(other) => (certificate, left) = (other, fewer),
+            None => place += 1,
         }
         if !may_continue() {
             return Vec::new();

@@ -41,7 +41,7 @@ fn conflict_is_out_of_reach_and_minimal() {
     let cases = [
         ("(a) (b)", "(and (a) (b) (c) (lamp))", "(a) (b) (c)"),
         ("(a)", "(and (lamp) (b) (c))", "(b) (c)"),
-        ("(a)", "(and (a) (lamp) (b) (c))", "(a) (b)"),
+        ("(a)", "(and (a) (lamp) (b) (c))", "(b) (c)"),
         ("(a) (b)", "(and (a) (b) (lamp))", ""),
         ("", "(and (a) (lamp))", ""),
         ("(a)", "(b)", ""),

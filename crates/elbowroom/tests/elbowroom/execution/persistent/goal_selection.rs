@@ -248,6 +248,16 @@ fn conflict_within_one_goal_is_named_when_idle() {
 }
 
 #[test]
+fn conflict_within_one_goal_is_the_reason_for_setting_it_aside() {
+    let script = vec![(0, pursue("both", "(and (at home) (at lab))"))];
+    let told = run(&task_with_rooms("(at ward)"), 100, script);
+    assert_has(
+        &told,
+        &["`both` set aside, because `(at home)` and `(at lab)` exclude each other"],
+    );
+}
+
+#[test]
 fn late_goal_is_set_aside_and_fails_at_its_deadline() {
     let script = vec![
         (0, pursue_by("ward", "(at ward)", 5)),
