@@ -7,12 +7,15 @@ use elbowroom::answers::{Event, Observer, TrialsProgress};
 use elbowroom_report::plot::IntervalPlot;
 use elbowroom_report::table::Table;
 use elbowroom_text::Source;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
-use crate::compare::{self, Experiment, Failures, Part, Results, TrialId};
+use crate::compare::{self, Experiment, TimedCounts};
 use crate::error::ExperimentError;
-use crate::perturbed::{self, PerturbedExperiment, PerturbedResults};
+use crate::failures::{Failures, TrialId};
+use crate::perturbed::{self, PerturbedExperiment, UntimedCounts};
 use crate::record::TrialRecords;
+use crate::results::{Origin, Results};
+use crate::trials::{self, Monitor, Part, Trials as _};
 
 /// Experiment of either kind.
 #[derive(Clone, Debug)]
@@ -33,13 +36,13 @@ pub struct CompareRequest<'a> {
 }
 
 /// Results of an experiment: `docs/formats/results-json.md`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum CompareAnswer {
     /// On a clock.
-    Timed(Results),
+    Timed(Results<TimedCounts>),
     /// In worlds without time.
-    Untimed(PerturbedResults),
+    Untimed(Results<UntimedCounts>),
 }
 
 /// Row, column, and the position of a kind of failure among the most frequent ones of that cell. In
@@ -128,12 +131,8 @@ impl AnyExperiment {
     /// Returns the total number of trials of a part.
     fn count(&self, part: Part) -> u64 {
         match self {
-            Self::Timed(experiment) => part.count(experiment),
-            Self::Untimed(experiment) => {
-                let rows =
-                    experiment.cases.len() * experiment.worlds.len() * experiment.executors.len();
-                part.numbers().count() as u64 * rows as u64
-            }
+            Self::Timed(experiment) => experiment.count(part),
+            Self::Untimed(experiment) => experiment.count(part),
         }
     }
 }
@@ -171,14 +170,13 @@ pub fn compare_recorded(
         }
         matches!(watcher.flow(), ControlFlow::Continue(()))
     };
+    let monitor = Monitor::new(&observe, records);
     Ok(match experiment {
         AnyExperiment::Timed(experiment) => {
-            let results = compare::run_recorded(experiment, part, records, &observe)?;
-            CompareAnswer::Timed(results)
+            CompareAnswer::Timed(trials::run(&**experiment, part, &monitor)?)
         }
         AnyExperiment::Untimed(experiment) => {
-            let results = perturbed::run_recorded(experiment, part, records, &observe)?;
-            CompareAnswer::Untimed(results)
+            CompareAnswer::Untimed(trials::run(&**experiment, part, &monitor)?)
         }
     })
 }
@@ -189,23 +187,12 @@ impl CompareAnswer {
     /// # Errors
     /// The text does not contain results, or those of another experiment.
     pub fn read(text: &str, experiment: &AnyExperiment) -> Result<Self, ExperimentError> {
-        let (answer, is_of_it) = match experiment {
-            AnyExperiment::Timed(experiment) => {
-                let results = Results::read(text)?;
-                let is_of_it = results.belong_to(experiment);
-                (Self::Timed(results), is_of_it)
-            }
+        Ok(match experiment {
+            AnyExperiment::Timed(experiment) => Self::Timed(Results::read_of(text, &**experiment)?),
             AnyExperiment::Untimed(experiment) => {
-                let results = PerturbedResults::read(text)?;
-                let is_of_it = results.belong_to(experiment);
-                (Self::Untimed(results), is_of_it)
+                Self::Untimed(Results::read_of(text, &**experiment)?)
             }
-        };
-        if is_of_it {
-            Ok(answer)
-        } else {
-            Err(ExperimentError::WrongExperiment)
-        }
+        })
     }
 
     /// Merges parts of one experiment.
@@ -213,20 +200,26 @@ impl CompareAnswer {
     /// # Errors
     /// There are no parts, they belong to different experiments, or a part occurs twice.
     pub fn merge_results(parts: &[Self]) -> Result<Self, ExperimentError> {
-        let timed = parts.iter().map(|part| match part {
-            Self::Timed(results) => Some(results.clone()),
-            Self::Untimed(_) => None,
-        });
-        if let Some(timed) = timed.collect::<Option<Vec<Results>>>() {
-            return Ok(Self::Timed(Results::merge_results(&timed)?));
+        let (mut timed, mut untimed) = (Vec::new(), Vec::new());
+        for part in parts {
+            match part {
+                Self::Timed(results) => timed.push(results.clone()),
+                Self::Untimed(results) => untimed.push(results.clone()),
+            }
         }
-        let untimed = parts.iter().map(|part| match part {
-            Self::Timed(_) => None,
-            Self::Untimed(results) => Some(results.clone()),
-        });
-        let untimed: Option<Vec<PerturbedResults>> = untimed.collect();
-        let untimed = untimed.ok_or(ExperimentError::WrongExperiment)?;
-        Ok(Self::Untimed(PerturbedResults::merge_results(&untimed)?))
+        match (timed.is_empty(), untimed.is_empty()) {
+            (_, true) => Ok(Self::Timed(Results::merge_results(&timed)?)),
+            (true, false) => Ok(Self::Untimed(Results::merge_results(&untimed)?)),
+            (false, false) => Err(ExperimentError::WrongExperiment),
+        }
+    }
+
+    /// Returns the experiment and its parts.
+    fn origin(&self) -> &Origin {
+        match self {
+            Self::Timed(results) => &results.origin,
+            Self::Untimed(results) => &results.origin,
+        }
     }
 
     /// Returns the first trial of each of the most frequent kinds of failure: at most `of_a_cell`
@@ -249,14 +242,14 @@ impl CompareAnswer {
         };
         match self {
             Self::Timed(results) => {
-                for (row, cells) in results.cells.iter().enumerate() {
+                for (row, cells) in results.counts.cells.iter().enumerate() {
                     for (column, cell) in cells.iter().enumerate() {
                         look(row, column, &cell.failures);
                     }
                 }
             }
             Self::Untimed(results) => {
-                for (row, own) in results.rows.iter().enumerate() {
+                for (row, own) in results.counts.rows.iter().enumerate() {
                     look(row, 0, &own.failures);
                 }
             }
@@ -283,7 +276,7 @@ impl CompareAnswer {
             return Vec::new();
         };
         let mut found = Vec::new();
-        for (row, cells) in results.cells.iter().enumerate() {
+        for (row, cells) in results.counts.cells.iter().enumerate() {
             for (column, cell) in cells.iter().enumerate() {
                 let place = (row, column, cell.failures.kinds().len());
                 let first = cell.invalid.first.as_ref();
@@ -298,18 +291,12 @@ impl CompareAnswer {
 
     /// Returns the results as JSON.
     pub fn json(&self) -> serde_json::Value {
-        match self {
-            Self::Timed(results) => results.json(),
-            Self::Untimed(results) => results.json(),
-        }
+        serde_json::to_value(self).unwrap_or_default()
     }
 
     /// Returns `true` if it was interrupted before all trials had run.
     pub fn is_interrupted(&self) -> bool {
-        match self {
-            Self::Timed(results) => results.is_interrupted,
-            Self::Untimed(results) => results.is_interrupted,
-        }
+        self.origin().is_interrupted
     }
 
     /// Returns the table.
@@ -321,7 +308,7 @@ impl CompareAnswer {
             (Self::Timed(results), AnyExperiment::Timed(experiment)) => {
                 Ok(results.table(experiment))
             }
-            (Self::Untimed(results), AnyExperiment::Untimed(_)) => Ok(perturbed::table(results)),
+            (Self::Untimed(results), AnyExperiment::Untimed(_)) => Ok(results.table()),
             _ => Err(ExperimentError::WrongExperiment),
         }
     }
@@ -330,7 +317,7 @@ impl CompareAnswer {
     pub fn records(&self) -> Table {
         match self {
             Self::Timed(results) => results.records(),
-            Self::Untimed(results) => perturbed::records(results),
+            Self::Untimed(results) => results.records(),
         }
     }
 
@@ -338,7 +325,7 @@ impl CompareAnswer {
     pub fn plots(&self) -> Vec<(String, IntervalPlot)> {
         match self {
             Self::Timed(results) => results.plots(),
-            Self::Untimed(results) => perturbed::plots(results),
+            Self::Untimed(results) => results.plots(),
         }
     }
 }

@@ -6,6 +6,9 @@
 //! of an experiment from several machines add up.
 //!
 //! - [`answer`]: an experiment of either kind as one request with one answer.
+//! - [`trials`]: the loop over the trials of either kind, in parallel and in parts.
+//! - [`results`]: the results of either kind, and the sum of parts.
+//! - [`failures`]: failed trials by kind, each with an example.
 //! - [`error`]: errors of both kinds.
 //! - [`compare`]: temporal execution (`docs/experiments.md`).
 //! - [`perturbed`]: worlds without time, in which starts and effects fail and facts change
@@ -28,8 +31,11 @@
 pub mod answer;
 pub mod compare;
 pub mod error;
+pub mod failures;
 pub mod perturbed;
 pub mod record;
+pub mod results;
+pub mod trials;
 pub mod untimed;
 pub mod worlds;
 

@@ -13,7 +13,6 @@ mod table;
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use crate::untimed::{
@@ -28,30 +27,20 @@ use elbowroom_num::work;
 use elbowroom_pddl::{Source, read_problem};
 use elbowroom_probability::Likelihoods;
 use elbowroom_probability::optimum::{self, DeadEnds};
-use rayon::prelude::*;
+use serde_json::Value;
 
 pub use experiment::{Case, OptimumRules, PerturbedExperiment, PlannerKind, Published, WorldKind};
-pub use results::{PerturbedResults, Row, Work};
+pub use results::{Row, UntimedCounts, Work};
 pub use stored_trial::{StoredPlan, StoredStep, StoredTrial};
-pub use table::{plots, records, table};
 
-use crate::compare::Part;
 use crate::error::ExperimentError;
-use crate::record::{TrialRecord, TrialRecords};
+use crate::record::TrialRecord;
+use crate::results::Results;
+use crate::trials::{Monitor, Part, Trials};
 use planner::EmbeddedPlans;
 
-/// Callbacks of the trials.
-struct TrialCallbacks<'w> {
-    /// Returns `false` to stop.
-    may_continue: &'w (dyn Fn() -> bool + Sync),
-    /// Called after each trial.
-    on_trial: &'w (dyn Fn() + Sync),
-    /// Collector of trial records, if any.
-    records: Option<&'w TrialRecords>,
-}
-
 /// Case, prepared for its trials.
-struct Setting<'e> {
+pub(crate) struct Setting<'e> {
     experiment: &'e PerturbedExperiment,
     case: &'e Case,
     /// Number of the case, which is part of the seeds.
@@ -67,8 +56,7 @@ struct Setting<'e> {
 }
 
 /// Runs the trials of each case, in each world, with each executor. `observe` receives the number
-/// of finished trials, and returns `false` to stop. The results of finished trials are kept
-/// ([`PerturbedResults::is_interrupted`]).
+/// of finished trials, and returns `false` to stop. The results of finished trials are kept.
 ///
 /// # Errors
 /// The problem or the likelihoods cannot be read, or are of an unsupported kind.
@@ -76,47 +64,61 @@ pub fn run(
     experiment: &PerturbedExperiment,
     part: Part,
     observe: &(dyn Fn(u64) -> bool + Sync),
-) -> Result<PerturbedResults, ExperimentError> {
-    run_recorded(experiment, part, None, observe)
+) -> Result<Results<UntimedCounts>, ExperimentError> {
+    crate::trials::run(experiment, part, &Monitor::new(observe, None))
 }
 
-/// Runs the trials, with a record of each.
-///
-/// # Errors
-/// As for [`run`].
-pub fn run_recorded(
-    experiment: &PerturbedExperiment,
-    part: Part,
-    records: Option<&TrialRecords>,
-    observe: &(dyn Fn(u64) -> bool + Sync),
-) -> Result<PerturbedResults, ExperimentError> {
-    let done = AtomicU64::new(0);
-    let watch = TrialCallbacks {
-        may_continue: &|| observe(done.load(Ordering::Relaxed)),
-        on_trial: &|| {
-            observe(done.fetch_add(1, Ordering::Relaxed) + 1);
-        },
-        records,
-    };
-    let settings: Vec<Setting<'_>> = (0..experiment.cases.len())
-        .map(|number| Setting::new(experiment, number))
-        .collect::<Result<_, _>>()?;
-    let rows: Vec<_> = rows(experiment)
-        .map(|(case, world, executor)| (&settings[case], (world, executor)))
-        .collect();
-    let pool = part.thread_pool()?;
-    let rows: Result<Vec<Row>, _> = pool.install(|| {
-        rows.par_iter()
-            .map(|(setting, row)| setting.row(*row, part.numbers(), &watch, None))
-            .collect()
-    });
-    let rows = rows?;
-    let is_whole = rows
-        .iter()
-        .all(|row| row.success.count == part.numbers().count() as u64);
-    let mut results = PerturbedResults::new(experiment, part, rows);
-    results.is_interrupted = !is_whole;
-    Ok(results)
+impl Trials for PerturbedExperiment {
+    type Counts = UntimedCounts;
+    type Piece<'e> = (Arc<Setting<'e>>, (WorldKind, ExecutorName));
+    type Made = Row;
+
+    fn title(&self) -> &str {
+        &self.title
+    }
+
+    fn identity(&self) -> Value {
+        self.identity()
+    }
+
+    fn empty_counts(&self) -> UntimedCounts {
+        let rows = rows(self)
+            .map(|(case, world, executor)| Row::new(&self.cases[case], world, executor, None));
+        UntimedCounts {
+            rows: rows.collect(),
+        }
+    }
+
+    fn setting_count(&self) -> usize {
+        rows(self).count()
+    }
+
+    fn pieces(&self, _: Part, _: usize) -> Result<Vec<Self::Piece<'_>>, ExperimentError> {
+        let settings = (0..self.cases.len())
+            .map(|number| Setting::new(self, number).map(Arc::new))
+            .collect::<Result<Vec<_>, _>>()?;
+        let rows = rows(self)
+            .map(|(case, world, executor)| (Arc::clone(&settings[case]), (world, executor)));
+        Ok(rows.collect())
+    }
+
+    fn run_piece(
+        &self,
+        (setting, row): &Self::Piece<'_>,
+        part: Part,
+        monitor: &Monitor<'_>,
+    ) -> Result<Row, ExperimentError> {
+        setting.row(*row, part.numbers(), monitor, None)
+    }
+
+    fn combine(
+        &self,
+        rows: Vec<Result<Row, ExperimentError>>,
+        _: bool,
+    ) -> Result<UntimedCounts, ExperimentError> {
+        let rows = rows.into_iter().collect::<Result<_, _>>()?;
+        Ok(UntimedCounts { rows })
+    }
 }
 
 /// Returns the rows of the results, in order: case, world and executor.
@@ -142,11 +144,7 @@ pub fn repeat_trials(
     trials: &[(usize, u64)],
 ) -> Result<Vec<String>, ExperimentError> {
     let rows: Vec<_> = rows(experiment).collect();
-    let watch = TrialCallbacks {
-        may_continue: &|| true,
-        on_trial: &|| {},
-        records: None,
-    };
+    let monitor = Monitor::new(&|_| true, None);
     // Trials of one case share a table, which takes long to compute.
     let mut settings: BTreeMap<usize, Setting<'_>> = BTreeMap::new();
     let mut texts = Vec::with_capacity(trials.len());
@@ -160,7 +158,7 @@ pub fn repeat_trials(
         };
         let mut course = StepRecord::default();
         let own = (world, executor);
-        setting.row(own, trial..=trial, &watch, Some(&mut course))?;
+        setting.row(own, trial..=trial, &monitor, Some(&mut course))?;
         texts.push(StoredTrial::new(setting, own, trial, &course).text());
     }
     Ok(texts)
@@ -358,10 +356,10 @@ impl<'e> Setting<'e> {
         &self,
         (world, kind): (WorldKind, ExecutorName),
         numbers: impl Iterator<Item = u64>,
-        watch: &TrialCallbacks<'_>,
+        monitor: &Monitor<'_>,
         course: Option<&mut StepRecord>,
     ) -> Result<Row, ExperimentError> {
-        if !(watch.may_continue)() {
+        if !monitor.may_continue() {
             return Ok(Row::new(self.case, world, kind, None));
         }
         let is_for_reading = course.is_some();
@@ -392,7 +390,7 @@ impl<'e> Setting<'e> {
             row.other_optima = self.other_optima().clone()?;
         }
         for number in numbers {
-            if !(watch.may_continue)() {
+            if !monitor.may_continue() {
                 break;
             }
             let seed = self.seed(number);
@@ -411,11 +409,9 @@ impl<'e> Setting<'e> {
             if work::is_stopped() {
                 break;
             }
-            if let Some(records) = watch.records {
-                records.add(self.record(kind_of_world, kind, (number, seed), &made));
-            }
+            monitor.record(|| self.record(kind_of_world, kind, (number, seed), &made));
             row.add(number, &made, &|action| self.name(action));
-            (watch.on_trial)();
+            monitor.count_trial();
         }
         Ok(row)
     }

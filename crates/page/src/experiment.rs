@@ -4,7 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use elbowroom::report::statistics::{Mean, Proportion, mcnemar};
 use elbowroom_laboratory::answer::FailurePosition;
-use elbowroom_laboratory::compare::{Cell, Results};
+use elbowroom_laboratory::compare::{Cell, TimedCounts};
+use elbowroom_laboratory::results::{Origin, Results};
 
 use crate::document::{Document, Rate, RateGroup, Rates, Section, Table, Text, Tone, Verdict};
 
@@ -16,7 +17,11 @@ pub(crate) const INTERVALS: &str =
 pub(crate) type Trials = BTreeMap<FailurePosition, Document>;
 
 /// The page about an experiment on a clock.
-pub(crate) fn timed(results: &Results, trials: Trials) -> Document {
+pub(crate) fn timed(results: &Results<TimedCounts>, trials: Trials) -> Document {
+    let Results {
+        origin,
+        counts: results,
+    } = results;
     let mut sections = vec![Section::Rates(Rates {
         heading: "Runs that reached the goal".to_owned(),
         note: if results.optimum.is_empty() {
@@ -39,28 +44,17 @@ pub(crate) fn timed(results: &Results, trials: Trials) -> Document {
     sections.push(Section::Table(causes));
     let (failures, more) = failures(results, trials);
     sections.extend(failures);
-    let runs = results
-        .cells
-        .iter()
-        .flatten()
-        .map(|cell| cell.runs)
-        .sum::<u64>();
-    let facts = facts(
-        results.trials,
-        results.shards,
-        &results.parts,
-        &results.fingerprint,
-    );
-    let made = trial_count_text(runs, "runs", results.is_interrupted);
+    let cells = results.cells.iter().flatten();
+    let runs = cells.map(|cell| cell.runs).sum::<u64>();
     Document {
         more,
-        ..document(&results.title, made, facts, sections)
+        ..experiment(origin, &format!("{runs} runs"), sections)
     }
 }
 
 /// Returns the table of the kinds of failure, linked to example trials, and the pages of these
 /// trials.
-fn failures(results: &Results, trials: Trials) -> (Option<Section>, Vec<Document>) {
+fn failures(results: &TimedCounts, trials: Trials) -> (Option<Section>, Vec<Document>) {
     let columns = [
         ("world", false),
         ("executor", false),
@@ -158,36 +152,27 @@ pub(crate) fn document(
     }
 }
 
-/// States the number of trials.
-pub(crate) fn trial_count_text(count: u64, what: &str, is_interrupted: bool) -> String {
-    if is_interrupted {
-        return format!("{count} {what}; the experiment was interrupted before it was complete.");
-    }
-    format!("{count} {what}.")
-}
-
-pub(crate) fn facts(
-    trials: u64,
-    shards: u64,
-    parts: &[u64],
-    fingerprint: &str,
-) -> Vec<(String, String)> {
+/// Builds the page of an experiment with so many trials.
+pub(crate) fn experiment(origin: &Origin, count: &str, sections: Vec<Section>) -> Document {
+    let end = if origin.is_interrupted {
+        "; the experiment was interrupted before it was complete"
+    } else {
+        ""
+    };
     let mut facts = vec![
-        ("trials of each".to_owned(), trials.to_string()),
-        ("fingerprint".to_owned(), fingerprint.to_owned()),
+        ("trials of each".to_owned(), origin.trials.to_string()),
+        ("fingerprint".to_owned(), origin.fingerprint.clone()),
     ];
-    if shards > 1 {
-        let parts: Vec<String> = parts.iter().map(u64::to_string).collect();
-        facts.push((
-            "parts".to_owned(),
-            format!("{} of {shards}", parts.join(", ")),
-        ));
+    if origin.shards > 1 {
+        let parts: Vec<String> = origin.parts.iter().map(u64::to_string).collect();
+        let parts = format!("{} of {}", parts.join(", "), origin.shards);
+        facts.push(("parts".to_owned(), parts));
     }
-    facts
+    document(&origin.title, format!("{count}{end}."), facts, sections)
 }
 
 /// The executors in one column.
-fn group(results: &Results, column: usize) -> RateGroup {
+fn group(results: &TimedCounts, column: usize) -> RateGroup {
     let best = results.optimum.get(column).filter(|best| best.is_known());
     let best = best.map(|best| best.upper);
     let rows = results.rows.iter().zip(&results.cells);
@@ -242,7 +227,7 @@ pub(crate) fn mean(mean: Mean) -> String {
 }
 
 /// Compares each executor with the first one, in the same worlds.
-fn pairs(results: &Results) -> Table {
+fn pairs(results: &TimedCounts) -> Table {
     let first = results.rows.first().cloned().unwrap_or_default();
     let columns = [
         ("world".to_owned(), false),
@@ -284,7 +269,7 @@ fn pairs(results: &Results) -> Table {
 
 /// Builds a table of counts with a column for each name.
 fn counts(
-    results: &Results,
+    results: &TimedCounts,
     heading: &str,
     counts: &dyn Fn(&Cell) -> BTreeMap<String, u64>,
 ) -> Table {

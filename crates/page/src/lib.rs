@@ -50,12 +50,14 @@ use elbowroom::answers::{EnvelopeAnswer, PlanAnswer, RegionAnswer, RunAnswer};
 use elbowroom::execute::RunSpec;
 use elbowroom::report::trace::Stored;
 use elbowroom_laboratory::answer::FailurePosition;
-use elbowroom_laboratory::compare::Results;
-use elbowroom_laboratory::perturbed::{PerturbedResults, StoredTrial};
+use elbowroom_laboratory::compare::TimedCounts;
+use elbowroom_laboratory::perturbed::{StoredTrial, UntimedCounts};
+use elbowroom_laboratory::results::{Counts as _, Results};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use document::Document;
+use experiment::Trials;
 
 pub use lanes::lanes_of_actions;
 pub use operator::operator_page;
@@ -106,7 +108,7 @@ pub fn page(name: &str, text: &str) -> Result<String, PageError> {
 
 /// Returns the page of the results of an experiment, which contains the traces of some failed
 /// trials. A trial is given by its row, its column and the position of its kind of failure among
-/// the most frequent ones ([`Failures::kinds`](elbowroom_laboratory::compare::Failures::kinds)),
+/// the most frequent ones ([`Failures::kinds`](elbowroom_laboratory::failures::Failures::kinds)),
 /// with the name and text of its trace.
 ///
 /// # Errors
@@ -116,21 +118,20 @@ pub fn experiment_page(
     text: &str,
     traces: &[(FailurePosition, String, String)],
 ) -> Result<String, PageError> {
-    let mut trials = experiment::Trials::new();
+    let mut trials = Trials::new();
     for (place, name, text) in traces {
         trials.insert(*place, document(name, text)?);
     }
-    let page = if format(text).as_deref() == Some(PERTURBED) {
-        perturbed::untimed_experiment(&perturbed_results(name, text)?, trials)
-    } else {
-        let results = Results::read(text).map_err(|error| damaged_input(name, &error))?;
-        experiment::timed(&results, trials)
-    };
-    Ok(html::html(&page))
+    Ok(html::html(&results_document(name, text, trials)?))
 }
 
-fn perturbed_results(name: &str, text: &str) -> Result<PerturbedResults, PageError> {
-    PerturbedResults::read(text).map_err(|error| damaged_input(name, &error))
+fn results_document(name: &str, text: &str, trials: Trials) -> Result<Document, PageError> {
+    let page = if format(text).as_deref() == Some(UntimedCounts::FORMAT) {
+        Results::read(text).map(|results| perturbed::untimed_experiment(&results, trials))
+    } else {
+        Results::read(text).map(|results| experiment::timed(&results, trials))
+    };
+    page.map_err(|error| damaged_input(name, &error))
 }
 
 /// Returns the live page of a running run, from its trace so far.
@@ -158,7 +159,6 @@ pub fn live_document(name: &str, text: &str, left_out: usize) -> Result<Document
 }
 
 const TRACE: &str = "elbowroom-trace";
-const PERTURBED: &str = "elbowroom-perturbed-results";
 
 fn trace_document(name: &str, text: &str, record: run::Record) -> Result<Document, PageError> {
     let stored = Stored::read(text).map_err(|error| damaged_input(name, &error))?;
@@ -208,16 +208,8 @@ pub fn document(name: &str, text: &str) -> Result<Document, PageError> {
             read::<PlanAnswer>(name, text).map(|it| plan::planner_answer(&it))
         }
         Some("elbowroom-run") => read::<RunAnswer>(name, text).map(|it| run::outcome(&it)),
-        Some("elbowroom-results") => {
-            let results = Results::read(text).map_err(|error| damaged_input(name, &error))?;
-            Ok(experiment::timed(&results, experiment::Trials::new()))
-        }
-        Some(PERTURBED) => {
-            let results = perturbed_results(name, text)?;
-            Ok(perturbed::untimed_experiment(
-                &results,
-                experiment::Trials::new(),
-            ))
+        Some(TimedCounts::FORMAT | UntimedCounts::FORMAT) => {
+            results_document(name, text, Trials::new())
         }
         Some("elbowroom-course") => {
             let course = StoredTrial::read(text).map_err(|error| damaged_input(name, &error))?;

@@ -1,17 +1,21 @@
 //! Pages of an experiment in worlds without time, and of one of its trials.
 
 use elbowroom::report::statistics::Proportion;
-use elbowroom_laboratory::perturbed::{PerturbedResults, StoredStep, StoredTrial};
+use elbowroom_laboratory::perturbed::{StoredStep, StoredTrial, UntimedCounts};
+use elbowroom_laboratory::results::Results;
 
 use crate::document::{Document, RateGroup, Rates, Section, Table, Text, Tone, Verdict};
 use crate::experiment::{
-    INTERVALS, Trials, column_headings, document, facts, mean, percent, rate, trial_count_text,
-    with_trials,
+    INTERVALS, Trials, column_headings, document, experiment, mean, percent, rate, with_trials,
 };
 use crate::plan::serialized_name;
 
 /// The page about an experiment in worlds without time.
-pub(crate) fn untimed_experiment(results: &PerturbedResults, trials: Trials) -> Document {
+pub(crate) fn untimed_experiment(results: &Results<UntimedCounts>, trials: Trials) -> Document {
+    let Results {
+        origin,
+        counts: results,
+    } = results;
     let mut groups: Vec<RateGroup> = Vec::new();
     let mut rows: Vec<Vec<Text>> = Vec::new();
     for row in &results.rows {
@@ -70,27 +74,17 @@ pub(crate) fn untimed_experiment(results: &PerturbedResults, trials: Trials) -> 
     ];
     let (failures, more) = failures(results, trials);
     sections.extend(failures);
-    let trials = results
-        .rows
-        .iter()
-        .map(|row| row.success.count)
-        .sum::<u64>();
-    let facts = facts(
-        results.trials,
-        results.shards,
-        &results.parts,
-        &results.fingerprint,
-    );
-    let made = trial_count_text(trials, "trials", results.is_interrupted);
+    let trials = results.rows.iter().map(|row| row.success.count);
+    let trials = format!("{} trials", trials.sum::<u64>());
     Document {
         more,
-        ..document(&results.title, made, facts, sections)
+        ..experiment(origin, &trials, sections)
     }
 }
 
 /// Returns the table of the kinds of failure, linked to example trials, and the pages of these
 /// trials.
-fn failures(results: &PerturbedResults, trials: Trials) -> (Option<Section>, Vec<Document>) {
+fn failures(results: &UntimedCounts, trials: Trials) -> (Option<Section>, Vec<Document>) {
     let columns = [
         ("case", false),
         ("world", false),

@@ -11,7 +11,7 @@ use std::{fs, thread};
 use elbowroom::answers::{Event, Observer, StopRequest};
 use elbowroom::text::Source;
 use elbowroom_laboratory::answer::{AnyExperiment, CompareAnswer, CompareRequest, compare};
-use elbowroom_laboratory::compare::Part;
+use elbowroom_laboratory::trials::Part;
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 

@@ -5,6 +5,7 @@
 
 use std::fmt::Write as _;
 
+use crate::statistics::{Mean, Proportion};
 use crate::svg::{self, INK, escaped, float, number, text, ticks};
 
 /// Values of several series, group by group.
@@ -38,6 +39,30 @@ pub struct Point {
     pub value: f64,
     /// The lower and the upper end of its interval.
     pub interval: Option<(f64, f64)>,
+}
+
+impl Point {
+    /// Returns a value without an interval.
+    pub fn exact(value: f64) -> Self {
+        Self {
+            value,
+            interval: None,
+        }
+    }
+
+    /// Returns a share in percent, with Wilson's interval.
+    pub fn share(of: Proportion) -> Option<Self> {
+        let percent = |(lower, upper)| (100.0 * lower, 100.0 * upper);
+        Some(Self {
+            value: 100.0 * of.share()?,
+            interval: of.wilson().map(percent),
+        })
+    }
+
+    /// Returns a mean without an interval.
+    pub fn mean(of: Mean) -> Option<Self> {
+        of.value().map(Self::exact)
+    }
 }
 
 /// Colours that colour-blind readers can distinguish (Okabe & Ito 2008).

@@ -9,9 +9,9 @@ use elbowroom::report::table::Table;
 use elbowroom_laboratory::answer::{
     AnyExperiment, CompareAnswer, CompareRequest, FailurePosition, compare_recorded,
 };
-use elbowroom_laboratory::compare::Part;
 use elbowroom_laboratory::error::ExperimentError;
 use elbowroom_laboratory::record::TrialRecords;
+use elbowroom_laboratory::trials::Part;
 
 use crate::args::CompareArgs;
 use crate::exit::{Answer, Exit, Failure};

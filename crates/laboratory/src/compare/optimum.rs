@@ -35,10 +35,10 @@ pub struct ColumnOptimum {
 /// solved in parallel, and the result does not depend on that.
 pub(super) fn of(
     experiment: &Experiment,
-    fillings: &[Vec<(String, String)>],
     part: Part,
     may_continue: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<ColumnOptimum>, ExperimentError> {
+    let fillings = experiment.fillings();
     let is_of_part = |(problem, _): &(usize, &Vec<(String, String)>)| {
         *problem as u64 % part.shards.max(1) == part.shard
     };
@@ -55,7 +55,7 @@ pub(super) fn of(
                     bounds(
                         experiment,
                         column,
-                        (problem, filling, threads),
+                        (problem, filling.clone(), threads),
                         may_continue,
                     )
                 })
@@ -68,7 +68,7 @@ pub(super) fn of(
 fn bounds(
     experiment: &Experiment,
     column: &Column,
-    (problem, filling, threads): (usize, &[(String, String)], usize),
+    (problem, filling, threads): (usize, Vec<(String, String)>, usize),
     may_continue: &(dyn Fn() -> bool + Sync),
 ) -> Result<Result<(f64, f64), String>, ExperimentError> {
     let setting = Setting {

@@ -8,33 +8,19 @@ use elbowroom_report::statistics::{Mean, Proportion};
 use elbowroom_report::table::Table;
 use serde::{Deserialize, Serialize};
 
+use super::Experiment;
 use super::clairvoyant;
 use super::experiment::CLAIRVOYANT;
 use super::initial_plans::{self, FirstPlanNote};
 use super::optimum::{self, ColumnOptimum};
-use super::parts::{self, Partial, fingerprint};
-use super::{Experiment, Failures, Part, TrialId};
 use crate::error::ExperimentError;
+use crate::failures::{Failures, TrialId};
+use crate::results::{Counts, Results};
 
-/// Counts by row and column. All counts are sums, so parts add up exactly, in any order.
+/// Counts by row and column.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Results {
-    format: String,
-    version: u64,
-    /// Title of the experiment.
-    pub title: String,
-    /// Fingerprint of the experiment. Only parts with the same fingerprint are merged.
-    pub fingerprint: String,
-    /// Number of trials of each problem and column in the whole experiment.
-    pub trials: u64,
-    /// Number of parts of the experiment.
-    pub shards: u64,
-    /// Parts in these results.
-    pub parts: Vec<u64>,
-    /// `true` if it was interrupted before all trials of these parts had run.
-    #[serde(default, skip_serializing_if = "parts::is_false")]
-    pub is_interrupted: bool,
+pub struct TimedCounts {
     /// The rows: executors.
     pub rows: Vec<String>,
     /// The columns.
@@ -114,26 +100,13 @@ pub struct DiscordantTrials {
     pub only_this: u64,
 }
 
-const FORMAT: &str = "elbowroom-results";
-
-impl Results {
-    /// Creates results without trials.
-    pub fn empty(experiment: &Experiment, part: Part) -> Self {
+impl TimedCounts {
+    /// Creates counts without trials.
+    pub(super) fn empty(experiment: &Experiment) -> Self {
         let rows = experiment.rows();
-        let columns: Vec<String> = experiment
-            .columns
-            .iter()
-            .map(|it| it.name.clone())
-            .collect();
+        let columns = experiment.columns.iter().map(|it| it.name.clone());
+        let columns: Vec<String> = columns.collect();
         Self {
-            format: FORMAT.to_owned(),
-            version: 1,
-            title: experiment.title.clone(),
-            fingerprint: fingerprint(&experiment.identity(), part.trials),
-            trials: part.trials,
-            shards: part.shards,
-            parts: vec![part.shard],
-            is_interrupted: false,
             cells: vec![vec![Cell::default(); columns.len()]; rows.len()],
             pairs: vec![vec![DiscordantTrials::default(); columns.len()]; rows.len()],
             beginnings: Vec::new(),
@@ -142,43 +115,14 @@ impl Results {
             columns,
         }
     }
+}
 
-    /// Reads results as JSON.
-    ///
-    /// # Errors
-    /// The text does not contain results.
-    pub fn read(text: &str) -> Result<Self, ExperimentError> {
-        parts::read(text)
-    }
-
-    /// Returns the results as JSON.
-    pub fn json(&self) -> serde_json::Value {
-        serde_json::to_value(self).unwrap_or_default()
-    }
-
-    /// Returns `true` if these are results of that experiment, with any number of trials.
-    pub fn belong_to(&self, experiment: &Experiment) -> bool {
-        self.fingerprint == fingerprint(&experiment.identity(), self.trials)
-            && self.rows == experiment.rows()
-            && self
-                .columns
-                .iter()
-                .eq(experiment.columns.iter().map(|it| &it.name))
-    }
-
-    /// Merges parts of one experiment.
-    ///
-    /// # Errors
-    /// They belong to different experiments, or a part occurs twice.
-    pub fn merge_results(parts: &[Self]) -> Result<Self, ExperimentError> {
-        parts::merge_parts(parts)
-    }
-
+impl Results<TimedCounts> {
     /// Returns the table: coverage with its 95 % interval, and the mean number of new plans of
     /// successful runs, next to the published figures.
     pub fn table(&self, experiment: &Experiment) -> Table {
         let mut headings = vec!["executor".to_owned()];
-        for column in &self.columns {
+        for column in &self.counts.columns {
             headings.push(format!("{column}: coverage [95 %]"));
             headings.push("replans".to_owned());
             if !experiment.published.is_empty() {
@@ -186,17 +130,17 @@ impl Results {
             }
         }
         let has_published = !experiment.published.is_empty();
-        let best = (!self.optimum.is_empty()).then(|| {
+        let best = (!self.counts.optimum.is_empty()).then(|| {
             let mut cells = vec![optimum::ROW.to_owned()];
-            for column in &self.optimum {
+            for column in &self.counts.optimum {
                 cells.extend([column.describe(), "-".to_owned()]);
                 cells.extend(has_published.then(|| "-".to_owned()));
             }
             cells
         });
-        let rows = self.rows.iter().enumerate().map(|(index, row)| {
+        let rows = self.counts.rows.iter().enumerate().map(|(index, row)| {
             let mut cells = vec![row.clone()];
-            for (column, cell) in self.cells[index].iter().enumerate() {
+            for (column, cell) in self.counts.cells[index].iter().enumerate() {
                 cells.extend(cell.describe());
                 if !experiment.published.is_empty() {
                     cells.push(experiment.published_text(row, column));
@@ -204,11 +148,10 @@ impl Results {
             }
             cells
         });
-        let mut made =
-            parts::describe_trials(self.trials, "each problem", self.shards, &self.parts);
-        if self.is_interrupted {
+        let mut made = self.origin.describe_trials("each problem");
+        if self.origin.is_interrupted {
             // All rows have the same trials.
-            let made_here = self.cells.first().map_or(0, |row| {
+            let made_here = self.counts.cells.first().map_or(0, |row| {
                 let runs = row.iter().map(|cell| cell.runs);
                 runs.sum::<u64>()
             });
@@ -218,7 +161,7 @@ impl Results {
             );
         }
         Table {
-            caption: format!("{} ({made})", self.title),
+            caption: format!("{} ({made})", self.origin.title),
             rows: rows.chain(best).collect(),
             headings,
             keys: 1,
@@ -240,8 +183,8 @@ impl Results {
             "mean_replans",
         ];
         let mut rows = Vec::new();
-        for (index, column) in self.columns.iter().enumerate() {
-            for (executor, cells) in self.rows.iter().zip(&self.cells) {
+        for (index, column) in self.counts.columns.iter().enumerate() {
+            for (executor, cells) in self.counts.rows.iter().zip(&self.counts.cells) {
                 let cell = &cells[index];
                 let number = |value: Option<f64>| {
                     value.map_or_else(String::new, |value| format!("{value:.4}"))
@@ -260,21 +203,19 @@ impl Results {
             }
         }
         Table {
-            caption: self.title.clone(),
+            caption: self.origin.title.clone(),
             headings: headings.map(str::to_owned).to_vec(),
             keys: 2,
             rows,
             notes: Vec::new(),
         }
     }
-}
 
-impl Results {
     /// Returns notes on the executions that the validator rejects, by row and column.
     pub fn invalid_notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
-        for (row, cells) in self.rows.iter().zip(&self.cells) {
-            for (column, cell) in self.columns.iter().zip(cells) {
+        for (row, cells) in self.counts.rows.iter().zip(&self.counts.cells) {
+            for (column, cell) in self.counts.columns.iter().zip(cells) {
                 let Invalid { runs, first } = &cell.invalid;
                 notes.extend(first.as_ref().map(|(id, what)| {
                     format!(
@@ -289,17 +230,17 @@ impl Results {
     }
 
     fn notes(&self) -> Vec<String> {
-        let mut notes = notes(&self.rows);
+        let mut notes = notes(&self.counts.rows);
         notes.extend(self.invalid_notes());
-        if !self.optimum.is_empty() {
+        if !self.counts.optimum.is_empty() {
             notes.push(format!("`{}`: {}", optimum::ROW, optimum::SUMMARY));
         }
         notes.extend(initial_plans::notes(
-            &self.beginnings,
-            &self.rows,
-            &self.columns,
+            &self.counts.beginnings,
+            &self.counts.rows,
+            &self.counts.columns,
         ));
-        for (name, column) in self.columns.iter().zip(&self.optimum) {
+        for (name, column) in self.counts.columns.iter().zip(&self.counts.optimum) {
             let reason = column.unknown.as_ref();
             notes.extend(reason.map(|why| format!("unknown `{}` in {name}: {why}", optimum::ROW)));
         }
@@ -323,17 +264,11 @@ fn notes(rows: &[String]) -> Vec<String> {
     notes
 }
 
-impl Partial for Results {
-    fn origin(&self) -> (&str, u64) {
-        (&self.fingerprint, self.shards)
-    }
+impl Counts for TimedCounts {
+    const FORMAT: &'static str = "elbowroom-results";
 
     fn has_shape_of(&self, other: &Self) -> bool {
         (&self.rows, &self.columns) == (&other.rows, &other.columns)
-    }
-
-    fn parts(&mut self) -> (&mut u64, &mut Vec<u64>) {
-        (&mut self.shards, &mut self.parts)
     }
 
     fn check(&self) -> Result<(), ExperimentError> {
@@ -341,11 +276,6 @@ impl Partial for Results {
         let cells: Vec<usize> = self.cells.iter().map(Vec::len).collect();
         let pairs: Vec<usize> = self.pairs.iter().map(Vec::len).collect();
         let is_for_all = self.optimum.is_empty() || self.optimum.len() == width;
-        parts::check(
-            (&self.format, self.version),
-            FORMAT,
-            (self.shards, &self.parts),
-        )?;
         if cells != vec![width; height] || pairs != cells || !is_for_all {
             return Err(ExperimentError::other("rows and columns do not fit"));
         }
@@ -353,7 +283,6 @@ impl Partial for Results {
     }
 
     fn add(&mut self, other: &Self) {
-        self.is_interrupted |= other.is_interrupted;
         initial_plans::merge(&mut self.beginnings, &other.beginnings);
         // Interrupted results may have no optimum.
         if self.optimum.is_empty() {

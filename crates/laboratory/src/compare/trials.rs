@@ -16,8 +16,8 @@ use elbowroom_sim::WorldModel;
 
 use super::scenario::Scenario;
 use super::{
-    Column, Experiment, ExperimentError, Part, Planning, Results, TrialId, clairvoyant,
-    initial_plans,
+    Column, Experiment, ExperimentError, Monitor, Part, Planning, TimedCounts, TrialId,
+    clairvoyant, initial_plans,
 };
 use elbowroom::answers::envelope::Search;
 use elbowroom::execute::{
@@ -25,7 +25,7 @@ use elbowroom::execute::{
 };
 use elbowroom::{RoundingRule, pipeline};
 
-use crate::record::{TrialRecord, TrialRecords};
+use crate::record::TrialRecord;
 
 /// Number of plans cached for one problem: some megabytes.
 pub(super) const PLAN_CACHE_SIZE: usize = 20_000;
@@ -34,10 +34,10 @@ pub(super) const PLAN_CACHE_SIZE: usize = 20_000;
 pub(super) const PREPARED_CACHE_SIZE: usize = 500;
 
 /// One problem, and some of its trials.
-pub(super) struct Setting<'a> {
+pub(crate) struct Setting<'a> {
     pub(super) experiment: &'a Experiment,
     pub(super) problem: usize,
-    pub(super) filling: &'a [(String, String)],
+    pub(super) filling: Vec<(String, String)>,
     /// Trials of the part: every `pieces`-th, from this one on.
     pub(super) piece: usize,
     pub(super) pieces: usize,
@@ -53,43 +53,35 @@ struct SharedSetup<'a> {
 }
 
 impl Setting<'_> {
-    /// Runs the trials of a part. `on_trial` is called after each, and returns `false` to stop;
-    /// `may_continue` is polled in between.
+    /// Runs the trials of a part.
     pub(super) fn run(
         &self,
         part: Part,
-        records: Option<&TrialRecords>,
-        on_trial: &(dyn Fn() -> bool + Sync),
-        may_continue: &(dyn Fn() -> bool + Sync),
-    ) -> Result<Results, ExperimentError> {
+        monitor: &Monitor<'_>,
+    ) -> Result<TimedCounts, ExperimentError> {
         let experiment = self.experiment;
-        let mut results = Results::empty(experiment, part);
-        if !may_continue() {
-            return Ok(results);
+        let mut counts = TimedCounts::empty(experiment);
+        if !monitor.may_continue() {
+            return Ok(counts);
         }
-        let mut common = self.common(may_continue)?;
+        let may_continue = || monitor.may_continue();
+        let mut common = self.common(&may_continue)?;
         // After an interruption, a table or a chosen plan may be missing.
-        if !may_continue() {
-            return Ok(results);
+        if !monitor.may_continue() {
+            return Ok(counts);
         }
         for place in &common.columns {
-            initial_plans::merge(&mut results.beginnings, &place.first_plan_notes);
+            initial_plans::merge(&mut counts.beginnings, &place.first_plan_notes);
         }
         for trial in part.numbers().skip(self.piece).step_by(self.pieces) {
             for column in 0..experiment.columns.len() {
-                self.trial(
-                    (trial, column),
-                    records,
-                    &mut common,
-                    &mut results,
-                    may_continue,
-                );
-                if !on_trial() {
-                    return Ok(results);
+                self.trial((trial, column), &mut common, &mut counts, monitor);
+                if !monitor.count_trial() {
+                    return Ok(counts);
                 }
             }
         }
-        Ok(results)
+        Ok(counts)
     }
 
     /// Reads the problem, computes the first plan, and prepares it for all executors.
@@ -146,10 +138,9 @@ impl Setting<'_> {
     fn trial(
         &self,
         (trial, column): (u64, usize),
-        records: Option<&TrialRecords>,
         common: &mut SharedSetup<'_>,
-        results: &mut Results,
-        may_continue: &(dyn Fn() -> bool + Sync),
+        counts: &mut TimedCounts,
+        monitor: &Monitor<'_>,
     ) {
         let seed = self.seed(trial);
         let executors = &self.experiment.executors;
@@ -159,7 +150,7 @@ impl Setting<'_> {
             // threads.
             let task = Arc::new(common.task.with_own_table());
             reports.push(self.execute(&task, seed, (row, spec), column, common, None));
-            if !may_continue() {
+            if !monitor.may_continue() {
                 return;
             }
         }
@@ -170,24 +161,22 @@ impl Setting<'_> {
                 problem: self.problem,
                 trial,
             };
-            results.cells[row][column].count(&report, id);
-            results.cells[row][column].invalid.count(&invalid, id);
-            if let Some(records) = records {
-                records.add(self.record((trial, seed), column, row, &report));
-            }
+            counts.cells[row][column].count(&report, id);
+            counts.cells[row][column].invalid.count(&invalid, id);
+            monitor.record(|| self.record((trial, seed), column, row, &report));
         }
         if self.experiment.clairvoyant {
             let world = &common.columns[column].world;
             // A goal that an executor has reached is also reachable with knowledge of the future.
             let is_possible = reached.contains(&true)
                 || clairvoyant::can_reach(&common.task, world, seed, &mut self.embedded());
-            let cell = &mut results.cells[reached.len()][column];
+            let cell = &mut counts.cells[reached.len()][column];
             cell.runs += 1;
             cell.successes += u64::from(is_possible);
             reached.push(is_possible);
         }
         for (row, this) in reached.iter().enumerate() {
-            let pair = &mut results.pairs[row][column];
+            let pair = &mut counts.pairs[row][column];
             pair.only_first += u64::from(reached[0] && !this);
             pair.only_this += u64::from(*this && !reached[0]);
         }
@@ -423,7 +412,7 @@ impl Setting<'_> {
     /// Returns the domain, and the problem with its blanks filled in.
     fn texts(&self) -> Result<(Source, Source), ExperimentError> {
         let mut text = self.experiment.problem.clone();
-        for (name, value) in self.filling {
+        for (name, value) in &self.filling {
             let blank = format!("{{{name}}}");
             if !text.contains(&blank) {
                 return Err(self.error(&format!("the problem has no blank {blank}")));

@@ -6,83 +6,21 @@ use crate::untimed::Trial;
 use elbowroom_report::statistics::{Mean, Proportion};
 use serde::{Deserialize, Serialize};
 
-use super::{Case, OptimumRules, PerturbedExperiment, WorldKind};
-use crate::compare::parts::{self, Partial, fingerprint};
-use crate::compare::{Failure, Failures, Part, TrialId};
-use crate::error::ExperimentError;
+use super::{Case, OptimumRules, WorldKind};
+use crate::failures::{Failure, Failures, TrialId};
+use crate::results::Counts;
 use crate::untimed::{ActionName, ExecutorName, StepKind};
 
-/// Counts by case, world and executor. All counts are sums, so parts add up exactly, in any order.
+/// Counts by case, world and executor.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct PerturbedResults {
-    format: String,
-    version: u64,
-    /// Title of the experiment.
-    pub title: String,
-    /// Fingerprint of the experiment. Only parts with the same fingerprint are merged.
-    pub fingerprint: String,
-    /// Number of trials of each row in the whole experiment.
-    pub trials: u64,
-    /// Number of parts of the experiment.
-    pub shards: u64,
-    /// Parts in these results.
-    pub parts: Vec<u64>,
-    /// `true` if it was interrupted before all trials of these parts had run.
-    #[serde(default, skip_serializing_if = "parts::is_false")]
-    pub is_interrupted: bool,
+pub struct UntimedCounts {
     /// The rows, by case and world.
     pub rows: Vec<Row>,
 }
 
-const FORMAT: &str = "elbowroom-perturbed-results";
-
-impl PerturbedResults {
-    pub(super) fn new(experiment: &PerturbedExperiment, part: Part, rows: Vec<Row>) -> Self {
-        Self {
-            format: FORMAT.to_owned(),
-            version: 1,
-            title: experiment.title.clone(),
-            fingerprint: fingerprint(&experiment.identity(), part.trials),
-            trials: part.trials,
-            shards: part.shards,
-            parts: vec![part.shard],
-            is_interrupted: false,
-            rows,
-        }
-    }
-
-    /// Reads results as JSON.
-    ///
-    /// # Errors
-    /// The text does not contain results.
-    pub fn read(text: &str) -> Result<Self, ExperimentError> {
-        parts::read(text)
-    }
-
-    /// Returns the results as JSON.
-    pub fn json(&self) -> serde_json::Value {
-        serde_json::to_value(self).unwrap_or_default()
-    }
-
-    /// Returns `true` if these are results of that experiment, with any number of trials.
-    pub fn belong_to(&self, experiment: &PerturbedExperiment) -> bool {
-        self.fingerprint == fingerprint(&experiment.identity(), self.trials)
-    }
-
-    /// Merges parts of one experiment.
-    ///
-    /// # Errors
-    /// They belong to different experiments, or a part occurs twice.
-    pub fn merge_results(parts: &[Self]) -> Result<Self, ExperimentError> {
-        parts::merge_parts(parts)
-    }
-}
-
-impl Partial for PerturbedResults {
-    fn origin(&self) -> (&str, u64) {
-        (&self.fingerprint, self.shards)
-    }
+impl Counts for UntimedCounts {
+    const FORMAT: &'static str = "elbowroom-perturbed-results";
 
     fn has_shape_of(&self, other: &Self) -> bool {
         self.rows
@@ -91,17 +29,7 @@ impl Partial for PerturbedResults {
             .eq(other.rows.iter().map(Row::name))
     }
 
-    fn parts(&mut self) -> (&mut u64, &mut Vec<u64>) {
-        (&mut self.shards, &mut self.parts)
-    }
-
-    fn check(&self) -> Result<(), ExperimentError> {
-        let parts = (self.shards, &self.parts[..]);
-        parts::check((&self.format, self.version), FORMAT, parts)
-    }
-
     fn add(&mut self, other: &Self) {
-        self.is_interrupted |= other.is_interrupted;
         for (mine, theirs) in self.rows.iter_mut().zip(&other.rows) {
             mine.merge(theirs);
         }

@@ -4,48 +4,99 @@ use elbowroom_report::plot::{IntervalPlot, Point, Series};
 use elbowroom_report::statistics::{Mean, Proportion};
 use elbowroom_report::table::Table;
 
-use crate::compare::parts;
-use crate::compare::plots::{mean, share};
-
-use super::{OptimumRules, PerturbedResults, Row, WorldKind};
+use super::{OptimumRules, Row, UntimedCounts, WorldKind};
+use crate::results::Results;
 use crate::untimed::ExecutorName;
 
-/// Returns the results as a table.
-pub fn table(results: &PerturbedResults) -> Table {
-    let mut title = results.title.clone();
-    let made = parts::describe_trials(results.trials, "each row", results.shards, &results.parts);
-    if results.is_interrupted {
-        title = format!("{title} (interrupted; of {made})");
-    } else if made.starts_with("incomplete") {
-        title = format!("{title} ({made})");
+impl Results<UntimedCounts> {
+    /// Returns the results as a table.
+    pub fn table(&self) -> Table {
+        let mut title = self.origin.title.clone();
+        let made = self.origin.describe_trials("each row");
+        if self.origin.is_interrupted {
+            title = format!("{title} (interrupted; of {made})");
+        } else if made.starts_with("incomplete") {
+            title = format!("{title} ({made})");
+        }
+        let rows = &self.counts.rows;
+        let caption = [title].into_iter();
+        let caption = caption
+            .chain(describe_agreement(rows))
+            .chain(describe_ratio_to_optimum(rows));
+        let interval = |row: &Row| {
+            let interval = row.success.wilson();
+            let interval =
+                interval.map(|(lower, upper)| format!("{:.1}–{:.1}", 100.0 * lower, 100.0 * upper));
+            vec![interval.unwrap_or_default()]
+        };
+        Table {
+            caption: caption.collect::<Vec<_>>().join("\n"),
+            ..of_rows(rows, &["95 % interval"], interval)
+        }
     }
-    let rows = &results.rows;
-    let caption = [title].into_iter();
-    let caption = caption
-        .chain(describe_agreement(rows))
-        .chain(describe_ratio_to_optimum(rows));
-    let interval = |row: &Row| {
-        let interval = row.success.wilson();
-        let interval =
-            interval.map(|(lower, upper)| format!("{:.1}–{:.1}", 100.0 * lower, 100.0 * upper));
-        vec![interval.unwrap_or_default()]
-    };
-    Table {
-        caption: caption.collect::<Vec<_>>().join("\n"),
-        ..of_rows(rows, &["95 % interval"], interval)
-    }
-}
 
-/// Returns the results for programs: a number in each cell.
-pub fn records(results: &PerturbedResults) -> Table {
-    let ends = |row: &Row| {
-        let interval = row.success.wilson();
-        let (lower, upper) = interval.unzip();
-        vec![percent(lower), percent(upper)]
-    };
-    Table {
-        caption: results.title.clone(),
-        ..of_rows(&results.rows, &["lower 95 %", "upper 95 %"], ends)
+    /// Returns the results for programs: a number in each cell.
+    pub fn records(&self) -> Table {
+        let ends = |row: &Row| {
+            let interval = row.success.wilson();
+            let (lower, upper) = interval.unzip();
+            vec![percent(lower), percent(upper)]
+        };
+        Table {
+            caption: self.origin.title.clone(),
+            ..of_rows(&self.counts.rows, &["lower 95 %", "upper 95 %"], ends)
+        }
+    }
+
+    /// Returns the figures of the paper for each world, with file names: success with the optimum (its
+    /// Table 1), replans (Figure 4), and actions, as the paper counts them, in trials that succeeded
+    /// and that failed (Figures 5 and 6).
+    pub fn plots(&self) -> Vec<(String, IntervalPlot)> {
+        let mut worlds: Vec<WorldKind> = self.counts.rows.iter().map(|row| row.world).collect();
+        worlds.sort_unstable();
+        worlds.dedup();
+        let of_world = |world: WorldKind| {
+            let success = |row: &Row| Point::share(row.success);
+            let actions = |work: super::Work| {
+                // Messages and failed starts are counted in the same trials.
+                let mut both = work.messages;
+                both.sum += work.failed_starts.sum;
+                Point::mean(both)
+            };
+            let plot = |what: &str, axis: &str, value: &dyn Fn(&Row) -> Option<Point>| {
+                picture(self, world, (what, axis), value)
+            };
+            let mut successes = plot(
+                "success, with 95 % intervals",
+                "successful trials, %",
+                &success,
+            );
+            successes.reference = reference(self, world);
+            successes.series.extend(published(self, world));
+            [
+                ("success", successes),
+                (
+                    "replans",
+                    plot("replans of successful trials", "mean", &|row| {
+                        Point::mean(row.replans)
+                    }),
+                ),
+                (
+                    "actions-success",
+                    plot("actions of successful trials", "mean", &|row| {
+                        actions(row.succeeded)
+                    }),
+                ),
+                (
+                    "actions-failure",
+                    plot("actions of failed trials", "mean", &|row| {
+                        actions(row.failed)
+                    }),
+                ),
+            ]
+            .map(|(name, plot)| (format!("{}-{name}", world.name()), plot))
+        };
+        worlds.into_iter().flat_map(of_world).collect()
     }
 }
 
@@ -159,57 +210,6 @@ fn describe_ratio_to_optimum(rows: &[Row]) -> Option<String> {
     ))
 }
 
-/// Returns the figures of the paper for each world, with file names: success with the optimum (its
-/// Table 1), replans (Figure 4), and actions, as the paper counts them, in trials that succeeded
-/// and that failed (Figures 5 and 6).
-pub fn plots(results: &PerturbedResults) -> Vec<(String, IntervalPlot)> {
-    let mut worlds: Vec<WorldKind> = results.rows.iter().map(|row| row.world).collect();
-    worlds.sort_unstable();
-    worlds.dedup();
-    let of_world = |world: WorldKind| {
-        let success = |row: &Row| share(row.success);
-        let actions = |work: super::Work| {
-            // Messages and failed starts are counted in the same trials.
-            let mut both = work.messages;
-            both.sum += work.failed_starts.sum;
-            mean(both)
-        };
-        let plot = |what: &str, axis: &str, value: &dyn Fn(&Row) -> Option<Point>| {
-            picture(results, world, (what, axis), value)
-        };
-        let mut successes = plot(
-            "success, with 95 % intervals",
-            "successful trials, %",
-            &success,
-        );
-        successes.reference = reference(results, world);
-        successes.series.extend(published(results, world));
-        [
-            ("success", successes),
-            (
-                "replans",
-                plot("replans of successful trials", "mean", &|row| {
-                    mean(row.replans)
-                }),
-            ),
-            (
-                "actions-success",
-                plot("actions of successful trials", "mean", &|row| {
-                    actions(row.succeeded)
-                }),
-            ),
-            (
-                "actions-failure",
-                plot("actions of failed trials", "mean", &|row| {
-                    actions(row.failed)
-                }),
-            ),
-        ]
-        .map(|(name, plot)| (format!("{}-{name}", world.name()), plot))
-    };
-    worlds.into_iter().flat_map(of_world).collect()
-}
-
 fn cases(rows: &[Row]) -> Vec<String> {
     let mut cases: Vec<String> = rows.iter().map(|row| row.case.clone()).collect();
     cases.dedup();
@@ -217,13 +217,13 @@ fn cases(rows: &[Row]) -> Vec<String> {
 }
 
 fn picture(
-    results: &PerturbedResults,
+    results: &Results<UntimedCounts>,
     world: WorldKind,
     (what, axis): (&str, &str),
     value: &dyn Fn(&Row) -> Option<Point>,
 ) -> IntervalPlot {
-    let groups = cases(&results.rows);
-    let rows = || results.rows.iter().filter(|row| row.world == world);
+    let groups = cases(&results.counts.rows);
+    let rows = || results.counts.rows.iter().filter(|row| row.world == world);
     let mut executors: Vec<ExecutorName> = Vec::new();
     for row in rows() {
         if !executors.contains(&row.executor) {
@@ -241,7 +241,7 @@ fn picture(
         }
     });
     IntervalPlot {
-        title: format!("{} ({}): {what}", results.title, world.name()),
+        title: format!("{} ({}): {what}", results.origin.title, world.name()),
         axis: axis.to_owned(),
         series: series.collect(),
         groups,
@@ -250,8 +250,8 @@ fn picture(
 }
 
 /// Returns the published results of each executor.
-fn published(results: &PerturbedResults, world: WorldKind) -> Vec<Series> {
-    let published = |row: &Row| row.published.and_then(share);
+fn published(results: &Results<UntimedCounts>, world: WorldKind) -> Vec<Series> {
+    let published = |row: &Row| row.published.and_then(Point::share);
     let mut series = picture(results, world, ("", ""), &published).series;
     series.retain(|series| series.points.iter().any(Option::is_some));
     for series in &mut series {
@@ -261,17 +261,14 @@ fn published(results: &PerturbedResults, world: WorldKind) -> Vec<Series> {
 }
 
 /// Returns the optimum, where it is known.
-fn reference(results: &PerturbedResults, world: WorldKind) -> Option<Series> {
+fn reference(results: &Results<UntimedCounts>, world: WorldKind) -> Option<Series> {
     let point = |case: String| {
-        let mut rows = results.rows.iter();
+        let mut rows = results.counts.rows.iter();
         let is_it = |row: &&Row| row.case == case && row.world == world && row.optimum.is_some();
         let value = 100.0 * rows.find(is_it)?.optimum?;
-        Some(Point {
-            value,
-            interval: None,
-        })
+        Some(Point::exact(value))
     };
-    let points: Vec<_> = cases(&results.rows).into_iter().map(point).collect();
+    let points: Vec<_> = cases(&results.counts.rows).into_iter().map(point).collect();
     points.iter().any(Option::is_some).then(|| Series {
         name: "optimum".to_owned(),
         points,

@@ -8,7 +8,8 @@ use elbowroom::answers::learn::{LearnRequest, Log, Settings, learn};
 use elbowroom::answers::run::simulate;
 use elbowroom::execute::{Candidates, Limits, NamedText, RunInputs, RunSpec, WorldNames};
 use elbowroom::report::trace::TraceWriter;
-use elbowroom_laboratory::compare::{Experiment, Part, run};
+use elbowroom_laboratory::compare::{Experiment, run};
+use elbowroom_laboratory::trials::Part;
 use elbowroom_model::{Situation, Task};
 use elbowroom_pddl::{Source, read_problem};
 use elbowroom_planner::embedded;
@@ -45,7 +46,7 @@ fn reached(experiment: &Experiment, trials: u64) -> Vec<f64> {
         jobs: 0,
     };
     let results = run(experiment, part, &|_| true).expect("it runs");
-    let cells = results.cells[0].iter();
+    let cells = results.counts.cells[0].iter();
     let few = |count: u64| f64::from(u32::try_from(count).expect("few trials"));
     cells
         .map(|cell| 100.0 * few(cell.successes) / few(cell.runs))
@@ -133,7 +134,8 @@ fn world_learnt_from_few_logs_is_as_good_as_the_true_one() {
     } else {
         &["detour", "rendezvous"]
     };
-    let times = times.unwrap_or(8);
+    let trials = if times.is_some() { 2000 } else { 1000 };
+    let times = times.unwrap_or(4);
     for name in names {
         let mut experiment = experiment(name, &["policy"]);
         for count in counts {
@@ -151,7 +153,7 @@ fn world_learnt_from_few_logs_is_as_good_as_the_true_one() {
                 experiment.columns.push(column);
             }
         }
-        let reached = reached(&experiment, 2000);
+        let reached = reached(&experiment, trials);
         let (truth, learnt) = reached.split_first().expect("as many as columns");
         let sets = usize::try_from(times).expect("few");
         for (count, of_count) in counts.iter().zip(learnt.chunks(sets)) {

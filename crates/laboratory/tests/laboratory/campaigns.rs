@@ -1,6 +1,8 @@
 //! Experiments have the same result for any number of threads, and parts add up.
 
-use elbowroom_laboratory::compare::{Experiment, Part, Results, run};
+use elbowroom_laboratory::compare::{Experiment, run};
+use elbowroom_laboratory::results::Results;
+use elbowroom_laboratory::trials::Part;
 use elbowroom_num::Rational;
 
 /// Reads a file of the project, by its path from the root.
@@ -95,17 +97,17 @@ fn column_specifies_likelihoods() {
         run(&experiment, part, &|_| true).expect("a correct test")
     };
     let (told, untold) = (make(told), make(untold));
-    let row = |name: &str| told.rows.iter().position(|row| row == name).unwrap();
+    let row = |name: &str| told.counts.rows.iter().position(|row| row == name).unwrap();
     let (adaptable, failing) = (row("adaptable"), 1);
     // With likelihoods, it retries failed starts. Without them, starts are certain, and a failure
     // is a reason to replan.
-    assert_eq!(told.cells[adaptable][failing].replans, 0);
-    assert!(untold.cells[adaptable][failing].replans > 30);
+    assert_eq!(told.counts.cells[adaptable][failing].replans, 0);
+    assert!(untold.counts.cells[adaptable][failing].replans > 30);
     for other in ["esterel", "stn", "guarded", "live"].map(row) {
         assert_eq!(
-            told.cells[other], untold.cells[other],
+            told.counts.cells[other], untold.counts.cells[other],
             "{}",
-            told.rows[other]
+            told.counts.rows[other]
         );
     }
 }
@@ -144,7 +146,8 @@ fn fingerprint_depends_on_content_and_is_stable() {
     let made = |change: &dyn Fn(&mut Experiment)| {
         let mut experiment = experiment();
         change(&mut experiment);
-        Results::empty(&experiment, WHOLE).fingerprint
+        let stopped = run(&experiment, WHOLE, &|_| false);
+        stopped.expect("a correct test").origin.fingerprint
     };
     let same = made(&|_| {});
     assert_eq!(same, made(&|experiment| experiment.title.clear()));
@@ -170,9 +173,13 @@ fn interruption_during_preparation_makes_no_trial() {
     let asked = std::sync::atomic::AtomicU64::new(0);
     let only_at_first = |_| asked.fetch_add(1, std::sync::atomic::Ordering::Relaxed) == 0;
     let results = run(&experiment, WHOLE, &only_at_first).expect("a correct test");
-    assert!(results.is_interrupted);
-    let mut cells = results.cells.iter().flatten();
-    assert!(cells.all(|cell| cell.runs == 0), "{:?}", results.cells);
+    assert!(results.origin.is_interrupted);
+    let mut cells = results.counts.cells.iter().flatten();
+    assert!(
+        cells.all(|cell| cell.runs == 0),
+        "{:?}",
+        results.counts.cells
+    );
 }
 
 /// Towers of Hanoi with seven discs, which need more than a few states.
@@ -227,9 +234,9 @@ fn interrupted_trial_does_not_count() {
     let experiment = experiment();
     let successes = |part, may_continue: &(dyn Fn(u64) -> bool + Sync)| {
         let results = run(&experiment, part, may_continue).expect("a correct test");
-        let cells = results.cells.into_iter().flatten();
+        let cells = results.counts.cells.into_iter().flatten();
         let counts: Vec<_> = cells.map(|cell| (cell.runs, cell.successes)).collect();
-        (counts, results.is_interrupted)
+        (counts, results.origin.is_interrupted)
     };
     let whole: Vec<_> = (1..=WHOLE.trials)
         .map(|trials| successes(Part { trials, ..WHOLE }, &|_| true).0)

@@ -6,7 +6,9 @@
 #![allow(clippy::print_stdout, reason = "the table is worth seeing")]
 
 use elbowroom::execute::FirstPlan;
-use elbowroom_laboratory::compare::{Experiment, Part, Results, run};
+use elbowroom_laboratory::compare::{Experiment, TimedCounts, run};
+use elbowroom_laboratory::results::Results;
+use elbowroom_laboratory::trials::Part;
 use elbowroom_pddl::Source;
 
 fn experiment(name: &str, first_plan: FirstPlan) -> Experiment {
@@ -24,7 +26,7 @@ fn experiment(name: &str, first_plan: FirstPlan) -> Experiment {
     }
 }
 
-fn results(experiment: &Experiment, jobs: usize, trials: u64) -> Results {
+fn results(experiment: &Experiment, jobs: usize, trials: u64) -> Results<TimedCounts> {
     let part = Part {
         trials,
         shard: 0,
@@ -63,7 +65,7 @@ fn likeliest_first_plans_are_never_worse_than_the_shortest() {
         for (row, executor) in shortest.executors.iter().enumerate() {
             for (column, place) in shortest.columns.iter().enumerate() {
                 let [before, after] =
-                    [&before, &after].map(|results| results.cells[row][column].successes);
+                    [&before, &after].map(|results| results.counts.cells[row][column].successes);
                 println!(
                     "{name} {}: {executor} {before} {after} of {trials}",
                     place.name
@@ -86,7 +88,7 @@ fn likeliest_first_plans_are_never_worse_than_the_shortest() {
 fn choices_do_not_depend_on_the_number_of_threads() {
     let read = only(experiment("weld", FirstPlan::Likeliest), &["live", "stn"]);
     let (one, many) = (results(&read, 1, 12), results(&read, 5, 12));
-    assert_eq!(one.cells, many.cells);
+    assert_eq!(one.counts.cells, many.counts.cells);
 }
 
 const DOMAIN: &str = "
@@ -130,7 +132,7 @@ fn executors_start_with_the_given_plan() {
     for (plan, successes) in [("0: (slow) [5]", 3), ("0: (quick) [1]", 0)] {
         let results = results(&with_plan(plan), 1, 3);
         assert!(
-            (results.cells.iter().flatten()).all(|cell| cell.successes == successes),
+            (results.counts.cells.iter().flatten()).all(|cell| cell.successes == successes),
             "{plan}"
         );
     }

@@ -3,12 +3,12 @@
 use std::fs;
 use std::path::Path;
 
-use elbowroom_laboratory::compare::Part;
 use elbowroom_laboratory::perturbed::{
-    self, OptimumRules, PerturbedExperiment, PerturbedResults, PlannerKind, Row, StoredTrial,
+    self, OptimumRules, PerturbedExperiment, PlannerKind, Row, StoredTrial, UntimedCounts,
     WorldKind,
 };
-use elbowroom_laboratory::record::TrialRecords;
+use elbowroom_laboratory::results::Results;
+use elbowroom_laboratory::trials::Part;
 
 /// Reads an experiment without optima by other rules, which take long.
 fn experiment(name: &str) -> PerturbedExperiment {
@@ -39,6 +39,7 @@ fn rows(name: &str, world: WorldKind, trials: u64) -> Vec<Row> {
     experiment.worlds = vec![world];
     perturbed::run(&experiment, part(trials, 0), &|_| true)
         .unwrap()
+        .counts
         .rows
 }
 
@@ -48,7 +49,7 @@ fn over_all_conditions_matter_only_if_lost_facts_return() {
     experiment.worlds = vec![WorldKind::Sound];
     experiment.executors.truncate(1);
     let results = perturbed::run(&experiment, part(1, 0), &|_| true).unwrap();
-    for row in &results.rows {
+    for row in &results.counts.rows {
         let (optimum, kept) = (
             row.optimum.unwrap(),
             row.other_optima[&OptimumRules::OverAllKept],
@@ -67,7 +68,7 @@ fn optimum_depends_on_dead_end_rule() {
     experiment.executors.truncate(1);
     experiment.cases.retain(|case| case.name == "AF3 p7");
     let results = perturbed::run(&experiment, part(10, 0), &|_| true).unwrap();
-    let row = &results.rows[0];
+    let row = &results.counts.rows[0];
     let by = |rules| row.other_optima[&rules];
     let lost = by(OptimumRules::DeadEndsLost);
     // A third of it comes from spontaneous changes in dead ends. Both figures have been confirmed
@@ -76,14 +77,14 @@ fn optimum_depends_on_dead_end_rule() {
     assert!((lost - 0.196).abs() < 0.0005, "{row:?}");
     // In this case lost facts never return, and each end requires the over-all condition.
     assert!((by(OptimumRules::DeadEndsLostOverAllKept) - lost).abs() < 1e-9);
-    let table = perturbed::table(&results);
+    let table = results.table();
     assert!(
         table
             .headings
             .iter()
             .any(|it| it == "optimum % (dead-ends-lost)")
     );
-    let read = PerturbedResults::read(&results.json().to_string()).unwrap();
+    let read = Results::read(&results.json().to_string()).unwrap();
     assert_eq!(read, results);
 }
 
@@ -200,7 +201,7 @@ fn olisipo_beats_esterel_and_stays_below_optimum_in_sound_world() {
 
 /// Checks that the results are the same for any number of threads, and the sum of the parts in any
 /// order.
-fn parts_add_up(experiment: &PerturbedExperiment, trials: u64) -> PerturbedResults {
+fn parts_add_up(experiment: &PerturbedExperiment, trials: u64) -> Results<UntimedCounts> {
     let run = |part| perturbed::run(experiment, part, &|_| true).unwrap();
     let whole = run(part(trials, 1));
     assert_eq!(whole, run(part(trials, 3)));
@@ -209,22 +210,20 @@ fn parts_add_up(experiment: &PerturbedExperiment, trials: u64) -> PerturbedResul
         shards: 2,
         ..part(trials, 2)
     };
-    let parts = [run(shard(1)), run(shard(0))]
-        .map(|part| PerturbedResults::read(&part.json().to_string()).unwrap());
+    let parts =
+        [run(shard(1)), run(shard(0))].map(|part| Results::read(&part.json().to_string()).unwrap());
     assert_ne!(parts[0], whole);
-    assert_eq!(PerturbedResults::merge_results(&parts).unwrap(), whole);
+    assert_eq!(Results::merge_results(&parts).unwrap(), whole);
     let twice = [parts[0].clone(), parts[0].clone()];
-    assert!(PerturbedResults::merge_results(&twice).is_err());
-    assert!(
-        PerturbedResults::merge_results(&[parts[0].clone(), run(part(trials - 1, 1))]).is_err()
-    );
+    assert!(Results::merge_results(&twice).is_err());
+    assert!(Results::merge_results(&[parts[0].clone(), run(part(trials - 1, 1))]).is_err());
     whole
 }
 
 #[test]
 fn results_are_independent_of_threads_and_parts() {
     let whole = parts_add_up(&experiment("olisipo_sf3.toml"), 21);
-    for (name, plot) in perturbed::plots(&whole) {
+    for (name, plot) in whole.plots() {
         assert!(plot.svg().contains("SF3 p10"), "{name}");
     }
 }
@@ -254,12 +253,15 @@ fn embedded_plans_are_independent_of_threads_and_parts() {
             ..experiment
         };
         let shortest = perturbed::run(&other, part(60, 0), &|_| true).unwrap();
-        assert!((whole.rows != shortest.rows) == has_other_plans, "{name}");
-        assert_ne!(whole.fingerprint, shortest.fingerprint);
-        assert!(PerturbedResults::merge_results(&[whole.clone(), shortest.clone()]).is_err());
+        assert!(
+            (whole.counts.rows != shortest.counts.rows) == has_other_plans,
+            "{name}"
+        );
+        assert_ne!(whole.origin.fingerprint, shortest.origin.fingerprint);
+        assert!(Results::merge_results(&[whole.clone(), shortest.clone()]).is_err());
         // An executor that does not use plans has the same results with any planner.
-        let foresighted = |results: &PerturbedResults| {
-            let rows = results.rows.iter();
+        let foresighted = |results: &Results<UntimedCounts>| {
+            let rows = results.counts.rows.iter();
             let rows = rows
                 .filter(|row| row.executor.name() == "lookahead" && row.world == WorldKind::Sound);
             rows.cloned().collect::<Vec<Row>>()
@@ -274,7 +276,7 @@ fn no_executor_exceeds_optimum_with_embedded_plans() {
         let mut experiment = with_embedded_plans(name);
         experiment.worlds = vec![WorldKind::Sound];
         let rows = perturbed::run(&experiment, part(500, 0), &|_| true).unwrap();
-        for row in &rows.rows {
+        for row in &rows.counts.rows {
             let (optimum, share) = (row.optimum.unwrap(), row.success.share().unwrap());
             let deviation = (optimum * (1.0 - optimum) / 500.0).sqrt();
             assert!(share < optimum + 4.0 * deviation, "{row:?}");
@@ -287,11 +289,9 @@ fn no_executor_exceeds_optimum_with_embedded_plans() {
 fn failures_are_counted_by_kind_and_can_be_repeated() {
     let mut experiment = experiment("olisipo_sf3.toml");
     experiment.cases.truncate(2);
-    let records = TrialRecords::default();
-    let made =
-        perturbed::run_recorded(&experiment, part(60, 0), Some(&records), &|_| true).unwrap();
+    let made = perturbed::run(&experiment, part(60, 0), &|_| true).unwrap();
     let mut endings = std::collections::BTreeSet::new();
-    for (place, row) in made.rows.iter().enumerate() {
+    for (place, row) in made.counts.rows.iter().enumerate() {
         let kinds = row.failures.kinds();
         let failed: u64 = kinds.iter().map(|kind| kind.runs).sum();
         assert_eq!(failed, row.success.count - row.success.successes);
@@ -318,15 +318,13 @@ fn failures_are_counted_by_kind_and_can_be_repeated() {
     }
     assert!(endings.len() > 1, "{endings:?}");
     // Repeated trials reach the goal again.
-    let table = records.table().csv();
-    assert!(table.contains("goal-reached"));
-    let row = &made.rows[0];
+    let row = &made.counts.rows[0];
     let all: Vec<(usize, u64)> = (0..60).map(|trial| (0, trial)).collect();
     let courses = perturbed::repeat_trials(&experiment, &all).unwrap();
     let has_failed = |text: &&String| StoredTrial::read(text).unwrap().ended != "goal-reached";
     let failed = courses.iter().filter(has_failed).count();
     assert_eq!(failed as u64, row.success.count - row.success.successes);
-    assert!(perturbed::repeat_trials(&experiment, &[(made.rows.len(), 0)]).is_err());
+    assert!(perturbed::repeat_trials(&experiment, &[(made.counts.rows.len(), 0)]).is_err());
 }
 
 #[test]
@@ -334,7 +332,7 @@ fn failure_kinds_do_not_depend_on_parts() {
     let mut experiment = experiment("olisipo_af3.toml");
     experiment.cases.truncate(1);
     let whole = perturbed::run(&experiment, part(40, 0), &|_| true).unwrap();
-    let parts: Vec<PerturbedResults> = (0..3)
+    let parts: Vec<Results<UntimedCounts>> = (0..3)
         .map(|shard| {
             let part = Part {
                 shard,
@@ -344,7 +342,7 @@ fn failure_kinds_do_not_depend_on_parts() {
             perturbed::run(&experiment, part, &|_| true).unwrap()
         })
         .collect();
-    assert_eq!(PerturbedResults::merge_results(&parts).unwrap(), whole);
+    assert_eq!(Results::merge_results(&parts).unwrap(), whole);
 }
 
 #[test]
@@ -383,7 +381,7 @@ fn optimum_is_0_without_first_plan() {
     };
     let experiment = PerturbedExperiment::read(text, &file).unwrap();
     let results = perturbed::run(&experiment, part(5, 1), &|_| true).unwrap();
-    for row in &results.rows {
+    for row in &results.counts.rows {
         assert_eq!(row.optimum, Some(0.0), "{row:?}");
     }
 }

@@ -15,7 +15,9 @@ use elbowroom::execute::{Embedded, Execution};
 use elbowroom::mdp::{Policy, Settings};
 use elbowroom_execution::run::{Report, Verdict};
 use elbowroom_execution::{ActionValues, PlanAnswer, Planner};
-use elbowroom_laboratory::compare::{Experiment, Part, Results, run};
+use elbowroom_laboratory::compare::{Experiment, TimedCounts, run};
+use elbowroom_laboratory::results::Results;
+use elbowroom_laboratory::trials::Part;
 use elbowroom_model::{Situation, Task};
 use elbowroom_num::Rational;
 use elbowroom_pddl::{Source, read_plan, read_problem};
@@ -39,7 +41,7 @@ fn trials() -> u64 {
     told.map_or(200, |told| told.parse().expect("a number of trials"))
 }
 
-fn results(name: &str, jobs: usize, trials: u64) -> Results {
+fn results(name: &str, jobs: usize, trials: u64) -> Results<TimedCounts> {
     let experiment = experiment(name);
     let part = Part {
         trials,
@@ -49,7 +51,7 @@ fn results(name: &str, jobs: usize, trials: u64) -> Results {
     };
     let results = run(&experiment, part, &|_| true).expect("it runs");
     println!("{name}\n{}", results.records().csv());
-    for optimum in &results.optimum {
+    for optimum in &results.counts.optimum {
         println!("optimum: {:.4} to {:.4}", optimum.lower, optimum.upper);
     }
     results
@@ -66,20 +68,21 @@ fn doubt(share: f64, trials: u64) -> f64 {
 fn is_near_the_optimum_and_above_all_others(name: &str) {
     let trials = trials();
     let results = results(name, 0, trials);
-    let optimum = &results.optimum[0];
+    let optimum = &results.counts.optimum[0];
     assert!(optimum.unknown.is_none(), "{optimum:?}");
     assert!(optimum.upper - optimum.lower <= 0.01, "{optimum:?}");
-    assert_eq!(results.rows[0], "policy");
-    let share = results.cells[0][0].successes as f64 / results.cells[0][0].runs as f64;
+    assert_eq!(results.counts.rows[0], "policy");
+    let share =
+        results.counts.cells[0][0].successes as f64 / results.counts.cells[0][0].runs as f64;
     let doubt = doubt(optimum.lower, trials);
     assert!(
         share >= optimum.upper - 0.02 - doubt && share <= optimum.upper + doubt,
         "{name}: {share} beside {optimum:?}"
     );
     // In the same worlds, an executor that is not worse loses about as often as it wins.
-    let rows = results.rows.iter().enumerate();
+    let rows = results.counts.rows.iter().enumerate();
     for (row, name) in rows.filter(|(_, name)| *name != "clairvoyant") {
-        let pair = results.pairs[row][0];
+        let pair = results.counts.pairs[row][0];
         let (lost, won) = (pair.only_this as f64, pair.only_first as f64);
         assert!(
             lost - won <= 3.0 * (lost + won).sqrt(),
@@ -124,8 +127,8 @@ fn machines_are_maintained_concurrently() {
 fn likelihood_executors_maintain_machines_in_parallel() {
     let results = results("machines", 0, 100);
     let won = |name: &str| {
-        let row = results.rows.iter().position(|row| row == name);
-        results.cells[row.expect("a row of the table")][0].successes
+        let row = results.counts.rows.iter().position(|row| row == name);
+        results.counts.cells[row.expect("a row of the table")][0].successes
     };
     for executor in ["adaptable", "lookahead"] {
         for baseline in ["esterel", "stn", "guarded", "live"] {

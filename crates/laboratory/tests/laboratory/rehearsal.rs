@@ -7,7 +7,9 @@
 #![allow(clippy::print_stdout, reason = "the table is worth seeing")]
 
 use elbowroom::execute::FirstPlan;
-use elbowroom_laboratory::compare::{Column, Experiment, Part, Results, run};
+use elbowroom_laboratory::compare::{Column, Experiment, TimedCounts, run};
+use elbowroom_laboratory::results::Results;
+use elbowroom_laboratory::trials::Part;
 use elbowroom_pddl::Source;
 
 /// `policy`, and the executors for comparison.
@@ -39,7 +41,7 @@ fn experiment(name: &str) -> Experiment {
     }
 }
 
-fn results(experiment: &Experiment, jobs: usize, trials: u64) -> Results {
+fn results(experiment: &Experiment, jobs: usize, trials: u64) -> Results<TimedCounts> {
     let part = Part {
         trials,
         shard: 0,
@@ -67,9 +69,9 @@ fn policy_without_table_is_near_optimum() {
         }
         let results = results(&experiment, 2, trials);
         for (column, place) in experiment.columns.iter().enumerate() {
-            for (row, executor) in results.rows.iter().enumerate() {
-                let cell = &results.cells[row][column];
-                let pair = results.pairs[row][column];
+            for (row, executor) in results.counts.rows.iter().enumerate() {
+                let cell = &results.counts.cells[row][column];
+                let pair = results.counts.pairs[row][column];
                 println!(
                     "{name} {}: {executor} {} of {}, {} replans; only policy {}, only {executor} {}; {:?}",
                     place.name,
@@ -86,7 +88,7 @@ fn policy_without_table_is_near_optimum() {
                     "{name}: {executor} is better: {lost} against {won}"
                 );
             }
-            let share = results.cells[0][column].successes as f64 / trials as f64;
+            let share = results.counts.cells[0][column].successes as f64 / trials as f64;
             for (_, near) in NEAR.iter().filter(|(near, _)| *near == name) {
                 assert!(share >= *near, "{name}: {share} is not near the optimum");
             }

@@ -1,6 +1,7 @@
 //! Timed optimum for problems of the published tables.
 
-use elbowroom_laboratory::compare::{ColumnOptimum, Experiment, Part, run};
+use elbowroom_laboratory::compare::{ColumnOptimum, Experiment, run};
+use elbowroom_laboratory::trials::Part;
 use elbowroom_pddl::Source;
 
 /// Returns the optimum of a table's columns for the first problem.
@@ -37,7 +38,10 @@ fn optimum_of(experiment: &Experiment) -> Vec<ColumnOptimum> {
         shards: 1,
         jobs: 0,
     };
-    run(experiment, part, &|_| true).expect("it runs").optimum
+    run(experiment, part, &|_| true)
+        .expect("it runs")
+        .counts
+        .optimum
 }
 
 /// Both windows close at the earliest time of all problems. A policy that aims at the later one is

@@ -49,7 +49,7 @@ impl Failures {
     }
 
     /// Counts a run.
-    pub(super) fn count(&mut self, report: &Report, first: TrialId) {
+    pub(crate) fn count(&mut self, report: &Report, first: TrialId) {
         if report.verdict == Verdict::GoalReached {
             return;
         }
