@@ -56,7 +56,7 @@ fn parts_of_separate_processes_merge_to_the_whole() {
 
 #[test]
 fn perturbed_parts_of_separate_processes_merge_to_the_whole() {
-    parts_add_up("experiments/olisipo_sf3.toml", &["--trials", "15"]);
+    parts_add_up("experiments/olisipo_sf3.toml", &["--trials", "4"]);
 }
 
 #[test]
@@ -64,7 +64,7 @@ fn an_experiment_in_perturbed_worlds_leaves_tables_and_plots() {
     let folder = temporary("perturbed");
     let path = folder.display().to_string();
     let experiment = ["experiments/olisipo.toml"];
-    compare(&experiment, &["--trials", "5", "--output", &path]);
+    compare(&experiment, &["--trials", "1", "--output", &path]);
     let mut names: Vec<String> = fs::read_dir(&folder)
         .expect("the folder")
         .map(|entry| entry.expect("a file").file_name().display().to_string())

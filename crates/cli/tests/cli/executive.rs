@@ -16,7 +16,6 @@ mod recorded;
 mod single_run;
 
 use crate::command;
-use crate::skipped;
 use std::fs;
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
@@ -24,7 +23,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::time::Duration;
 
-use crate::skipped::skipped;
+use crate::robots::{check_tickets, lines, python_is_there};
 use client::{Executive, TOKEN, folder};
 use serde_json::{Value, json};
 
@@ -38,16 +37,6 @@ fn simulated(name: &str) -> Executive {
 
 fn ctl(line: &[&str]) -> Output {
     command::elbowroom(&[&["ctl"], line].concat())
-}
-
-/// Returns `true` if Python is available for simulated robots; otherwise reports the test as
-/// skipped.
-fn python_is_there() -> bool {
-    let is_there = Command::new("python3").arg("--version").output().is_ok();
-    if !is_there {
-        skipped("there is no python3");
-    }
-    is_there
 }
 
 fn exact(number: &Value) -> f64 {
@@ -501,11 +490,6 @@ fn kill(pid: &str) {
     let _ = Command::new("kill").args(["-9", pid.trim()]).output();
 }
 
-fn lines(folder: &Path, file: &str) -> Vec<String> {
-    let text = fs::read_to_string(folder.join(file)).unwrap_or_default();
-    text.lines().map(str::to_owned).collect()
-}
-
 fn with_robot(folder: &Path, journal: &str) -> Vec<String> {
     let robot = format!(
         "python3 crates/cli/tests/files/robot.py {}",
@@ -554,11 +538,7 @@ fn accepted_requests_survive_kill_9() {
         again.post("/v1/stop", &Value::Null);
         assert_eq!(again.end().status.code(), Some(0));
         let begun = lines(&place, "begun");
-        let mut tickets: Vec<&str> = begun.iter().filter_map(|it| it.split(' ').next()).collect();
-        tickets.sort_unstable();
-        let count = tickets.len();
-        tickets.dedup();
-        assert_eq!(tickets.len(), count, "begun twice: {begun:?}");
+        check_tickets(&place, "resumed");
         assert!(
             lines(&place, "done").iter().any(|it| it.contains("b1 b2)")),
             "{begun:?}"

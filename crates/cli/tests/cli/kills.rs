@@ -11,16 +11,14 @@
 
 mod disks;
 
-use crate::command;
-use crate::skipped;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
 use crate::command::{elbowroom, root};
-use crate::skipped::skipped;
+use crate::robots::{Rng, check_tickets, folder, lines, python_is_there, record_count};
 
 const ERRANDS: [&str; 3] = [
     "crates/cli/tests/files/errands/domain.pddl",
@@ -28,28 +26,11 @@ const ERRANDS: [&str; 3] = [
     "crates/cli/tests/files/errands/plan.plan",
 ];
 
-fn python_is_there() -> bool {
-    let is_there = Command::new("python3").arg("--version").output().is_ok();
-    if !is_there {
-        skipped("there is no python3");
-    }
-    is_there
-}
-
 /// Maximum number of records between two kills. A run without kills writes about as many.
 const MAX_RECORDS: u64 = 40;
 
 /// Number of concurrent runs.
 const WORKERS: u8 = 4;
-
-/// A folder that no other test uses.
-fn folder(name: &str) -> PathBuf {
-    let name = format!("elbowroom-{}-kills-{name}", std::process::id());
-    let folder = std::env::temp_dir().join(name);
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir(&folder).expect("a folder can be made");
-    folder
-}
 
 /// Returns the command that begins a run in this folder. With a planner, it has no first plan.
 fn beginning(folder: &Path, journal: &str, has_planner: bool) -> Vec<String> {
@@ -82,19 +63,6 @@ fn started(line: &[String]) -> Child {
         .stderr(Stdio::piped())
         .spawn()
         .expect("the command can be started")
-}
-
-/// Pseudo-random numbers: the upper bits of a linear congruential generator.
-struct Rng(u64);
-
-impl Rng {
-    fn below(&mut self, limit: u64) -> u64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) % limit
-    }
 }
 
 /// Returns the output of a program that must end by itself.
@@ -170,12 +138,6 @@ impl Victim {
     }
 }
 
-/// Returns the number of complete records of a journal.
-fn record_count(journal: &str) -> u64 {
-    let bytes = fs::read(journal).unwrap_or_default();
-    bytes.iter().map(|byte| u64::from(*byte == b'\n')).sum()
-}
-
 /// Waits until the journal has `count` records, or the run has ended.
 fn wait_for_records(child: &mut Child, journal: &str, count: u64) {
     for _ in 0..60_000 {
@@ -187,11 +149,6 @@ fn wait_for_records(child: &mut Child, journal: &str, count: u64) {
     }
     let _ = child.kill();
     panic!("the run is stuck before record {count}");
-}
-
-fn lines(folder: &Path, file: &str) -> Vec<String> {
-    let text = fs::read_to_string(folder.join(file)).unwrap_or_default();
-    text.lines().map(str::to_owned).collect()
 }
 
 /// Checks that nothing was started twice, and that everything reported as done was done.
@@ -224,16 +181,7 @@ fn check_starts(folder: &Path, what: &str) {
         let first = done.entry(errand.to_owned()).or_insert(ticket.to_owned());
         assert_eq!(first, ticket, "{what}: {errand} was done, and done again");
     }
-    let begun = lines(folder, "begun");
-    let tickets: BTreeSet<_> = begun
-        .iter()
-        .filter_map(|line| line.split(' ').next())
-        .collect();
-    assert_eq!(
-        tickets.len(),
-        begun.len(),
-        "{what}: begun twice: {begun:#?}"
-    );
+    check_tickets(folder, what);
 }
 
 /// Kills a run up to three times and resumes it each time. Every third run has a planner, which may

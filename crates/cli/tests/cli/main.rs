@@ -15,6 +15,7 @@ mod limits;
 mod readme;
 mod refusals;
 mod replay;
+mod robots;
 mod rounded_plans;
 mod run_ends;
 mod run_planner;

@@ -6,7 +6,7 @@ use std::fs;
 use std::process::Command;
 
 use crate::command::{elbowroom, root};
-use crate::skipped::skipped;
+use crate::robots::python_is_there;
 use serde_json::{Value, json};
 
 const DELIVERY: [&str; 3] = [
@@ -14,14 +14,6 @@ const DELIVERY: [&str; 3] = [
     "cases/delivery/problem.pddl",
     "cases/delivery/plan.plan",
 ];
-
-fn python_is_there() -> bool {
-    let is_there = Command::new("python3").arg("--version").output().is_ok();
-    if !is_there {
-        skipped("there is no python3");
-    }
-    is_there
-}
 
 /// Returns the document about this world, and the exit code.
 fn checked(command: &str, options: &[&str]) -> (Value, Option<i32>) {

@@ -135,7 +135,7 @@ fn world_learnt_from_few_logs_is_as_good_as_the_true_one() {
         &["detour", "rendezvous"]
     };
     let trials = if times.is_some() { 2000 } else { 1000 };
-    let times = times.unwrap_or(4);
+    let times = times.unwrap_or(2);
     for name in names {
         let mut experiment = experiment(name, &["policy"]);
         for count in counts {
@@ -177,7 +177,7 @@ fn executors_use_the_believed_world() {
     let mut wrong = own.clone();
     wrong.believed = Some("format = \"elbowroom-world\"\nversion = 1\n".to_owned());
     experiment.columns.extend([same, wrong]);
-    let reached = reached(&experiment, 400);
+    let reached = reached(&experiment, 100);
     assert!((reached[0] - reached[1]).abs() < 1e-9, "{reached:?}");
     assert!(reached[2] < reached[0] - 10.0, "{reached:?}");
 }

@@ -1,4 +1,6 @@
 //! Experiments of paper 2.
+//!
+//! `ELBOWROOM_UNTIMED_TRIALS=3000` sets the number of trials of the tests that compare shares.
 
 use std::fs;
 use std::path::Path;
@@ -25,6 +27,17 @@ fn whole_experiment(name: &str) -> PerturbedExperiment {
     PerturbedExperiment::read(&file(name).unwrap(), &file).unwrap()
 }
 
+/// Number of trials of the tests that compare shares.
+fn trials() -> u32 {
+    let trials = std::env::var("ELBOWROOM_UNTIMED_TRIALS").ok();
+    trials.map_or(500, |trials| trials.parse().expect("a number of trials"))
+}
+
+/// Returns the standard deviation of the share of successful trials.
+fn deviation(probability: f64) -> f64 {
+    (probability * (1.0 - probability) / f64::from(trials())).sqrt()
+}
+
 fn part(trials: u64, jobs: usize) -> Part {
     Part {
         trials,
@@ -34,10 +47,10 @@ fn part(trials: u64, jobs: usize) -> Part {
     }
 }
 
-fn rows(name: &str, world: WorldKind, trials: u64) -> Vec<Row> {
+fn rows(name: &str, world: WorldKind) -> Vec<Row> {
     let mut experiment = experiment(name);
     experiment.worlds = vec![world];
-    perturbed::run(&experiment, part(trials, 0), &|_| true)
+    perturbed::run(&experiment, part(trials().into(), 0), &|_| true)
         .unwrap()
         .counts
         .rows
@@ -96,7 +109,7 @@ fn share(rows: &[Row], case: &str, executor: &str) -> f64 {
 #[test]
 fn published_success_rates_are_reproduced_in_published_world() {
     for (name, count) in [("olisipo_sf3.toml", 20), ("olisipo_af3.toml", 16)] {
-        let rows = rows(name, WorldKind::AsPublished, 1000);
+        let rows = rows(name, WorldKind::AsPublished);
         let distances: Vec<f64> = rows.iter().filter_map(Row::distance).collect();
         assert_eq!(distances.len(), count);
         for (row, distance) in rows
@@ -122,12 +135,11 @@ fn published_success_rates_are_reproduced_in_published_world() {
 #[test]
 fn lookahead_success_rate_matches_its_table() {
     for name in ["olisipo_sf3.toml", "olisipo_af3.toml"] {
-        let rows = rows(name, WorldKind::Sound, 1000).into_iter();
+        let rows = rows(name, WorldKind::Sound).into_iter();
         for row in rows.filter(|row| row.executor.name() == "lookahead") {
             let optimum = row.optimum.unwrap();
             let share = row.success.share().unwrap();
-            let deviation = (optimum * (1.0 - optimum) / 1000.0).sqrt();
-            let distance = (share - optimum) / deviation;
+            let distance = (share - optimum) / deviation(optimum);
             assert!(distance.abs() < 4.0, "{}: {share} {optimum}", row.case);
         }
     }
@@ -135,13 +147,11 @@ fn lookahead_success_rate_matches_its_table() {
 
 #[test]
 fn lookahead_is_optimal_where_ends_fail() {
-    let trials = 3000.0_f64;
     let mut shares = Vec::new();
-    for row in rows("grasp.toml", WorldKind::Sound, 3000) {
+    for row in rows("grasp.toml", WorldKind::Sound) {
         let optimum = row.optimum.unwrap();
         let share = row.success.share().unwrap();
-        let deviation = (optimum * (1.0 - optimum) / trials).sqrt();
-        let distance = (share - optimum) / deviation;
+        let distance = (share - optimum) / deviation(optimum);
         assert!(distance < 4.0, "{row:?}");
         if row.executor.name() == "lookahead" {
             assert!(distance > -4.0, "{}: {share} {optimum}", row.case);
@@ -184,7 +194,7 @@ fn unsupported_likelihoods_are_rejected_by_name() {
 #[test]
 fn olisipo_beats_esterel_and_stays_below_optimum_in_sound_world() {
     for name in ["olisipo_sf3.toml", "olisipo_af3.toml"] {
-        let rows = rows(name, WorldKind::Sound, 2000);
+        let rows = rows(name, WorldKind::Sound);
         for case in &experiment(name).cases {
             let adaptable = share(&rows, &case.name, "adaptable");
             let esterel = share(&rows, &case.name, "esterel");
@@ -193,8 +203,7 @@ fn olisipo_beats_esterel_and_stays_below_optimum_in_sound_world() {
         for row in rows {
             let optimum = row.optimum.unwrap();
             let share = row.success.share().unwrap();
-            let deviation = (optimum * (1.0 - optimum) / 2000.0).sqrt();
-            assert!(share < optimum + 4.0 * deviation, "{row:?}");
+            assert!(share < optimum + 4.0 * deviation(optimum), "{row:?}");
         }
     }
 }
@@ -246,13 +255,13 @@ fn with_embedded_plans(name: &str) -> PerturbedExperiment {
 fn embedded_plans_are_independent_of_threads_and_parts() {
     for (name, has_other_plans) in [("olisipo_sf3.toml", false), ("olisipo_af3.toml", true)] {
         let experiment = with_embedded_plans(name);
-        let whole = parts_add_up(&experiment, 60);
+        let whole = parts_add_up(&experiment, 16);
         // In SF3, the shortest plan is the only one without a useless action.
         let other = PerturbedExperiment {
             planner: PlannerKind::Shortest,
             ..experiment
         };
-        let shortest = perturbed::run(&other, part(60, 0), &|_| true).unwrap();
+        let shortest = perturbed::run(&other, part(16, 0), &|_| true).unwrap();
         assert!(
             (whole.counts.rows != shortest.counts.rows) == has_other_plans,
             "{name}"
@@ -275,11 +284,10 @@ fn no_executor_exceeds_optimum_with_embedded_plans() {
     for name in ["olisipo_sf3.toml", "olisipo_af3.toml"] {
         let mut experiment = with_embedded_plans(name);
         experiment.worlds = vec![WorldKind::Sound];
-        let rows = perturbed::run(&experiment, part(500, 0), &|_| true).unwrap();
+        let rows = perturbed::run(&experiment, part(trials().into(), 0), &|_| true).unwrap();
         for row in &rows.counts.rows {
             let (optimum, share) = (row.optimum.unwrap(), row.success.share().unwrap());
-            let deviation = (optimum * (1.0 - optimum) / 500.0).sqrt();
-            assert!(share < optimum + 4.0 * deviation, "{row:?}");
+            assert!(share < optimum + 4.0 * deviation(optimum), "{row:?}");
             assert!(share > 0.05, "{row:?}");
         }
     }

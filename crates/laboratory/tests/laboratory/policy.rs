@@ -221,7 +221,7 @@ fn made_of(small: &Small<'_>, runs: u64) -> Option<PolicyResults> {
 #[allow(clippy::cast_precision_loss, reason = "there are few runs")]
 fn policy_matches_recursion_in_random_small_worlds() {
     const RUNS: u64 = 200;
-    const OF_EACH_KIND: usize = 10;
+    const OF_EACH_KIND: usize = 5;
     let mut tried = [0; 4];
     // Over all worlds, by baseline: the number of runs that only the baseline wins, and that only
     // `policy` wins.

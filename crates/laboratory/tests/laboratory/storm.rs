@@ -5,6 +5,7 @@
 #![allow(clippy::print_stdout, reason = "what Storm says is worth seeing")]
 
 use crate::twin;
+use std::ffi::OsString;
 use std::fs;
 use std::path::PathBuf;
 use std::process::Command;
@@ -40,13 +41,17 @@ fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// Returns the results of Storm for each text. Those from `exact` on are computed with fractions.
-/// `None` if Storm is not available.
-fn storm(test: &str, texts: &[String], exact: usize) -> Option<Vec<StormResult>> {
-    let Some(python) = std::env::var_os("ELBOWROOM_STORM") else {
+/// Returns the Python program with Storm; without it, reports the test as skipped.
+fn python() -> Option<OsString> {
+    let python = std::env::var_os("ELBOWROOM_STORM");
+    if python.is_none() {
         skipped("ELBOWROOM_STORM names no Python with stormpy");
-        return None;
-    };
+    }
+    python
+}
+
+/// Returns the results of Storm for each text. Those from `exact` on are computed with fractions.
+fn storm(python: OsString, test: &str, texts: &[String], exact: usize) -> Vec<StormResult> {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(test);
     fs::create_dir_all(&folder).expect("a folder for texts");
     let mut arguments = Vec::new();
@@ -73,7 +78,7 @@ fn storm(test: &str, texts: &[String], exact: usize) -> Option<Vec<StormResult>>
     assert_eq!(said.len(), texts.len(), "{errors}");
     let is_exact = |said: &StormResult| said.fraction.is_some();
     assert!(said[exact.min(said.len())..].iter().all(is_exact));
-    Some(said)
+    said
 }
 
 fn task(domain: &str, problem: &str) -> Task {
@@ -108,6 +113,9 @@ fn assert_the_same(name: &str, ours: f64, said: &StormResult) {
 
 #[test]
 fn optima_of_paper_2_match_storm() {
+    let Some(python) = python() else {
+        return;
+    };
     let folder = root().join("experiments");
     let file = |path: &str| fs::read_to_string(folder.join(path)).map_err(|it| it.to_string());
     let text = file("olisipo.toml").expect("it is there");
@@ -147,9 +155,7 @@ fn optima_of_paper_2_match_storm() {
         }
     }
     let exact = exact.expect("one of the cases");
-    let Some(said) = storm("paper-2", &texts, exact) else {
-        return;
-    };
+    let said = storm(python, "paper-2", &texts, exact);
     for ((name, ours), said) in names.iter().zip(&ours).zip(&said) {
         assert_the_same(name, *ours, said);
     }
@@ -157,6 +163,9 @@ fn optima_of_paper_2_match_storm() {
 
 #[test]
 fn cases_with_beliefs_and_instantaneous_actions_match_storm() {
+    let Some(python) = python() else {
+        return;
+    };
     let domain = "
         (define (domain door) (:requirements :strips :durative-actions :negative-preconditions)
           (:predicates (open) (inside) (dark) (seen) (bell))
@@ -201,9 +210,7 @@ fn cases_with_beliefs_and_instantaneous_actions_match_storm() {
             }
         }
     }
-    let Some(said) = storm("door", &texts, 0) else {
-        return;
-    };
+    let said = storm(python, "door", &texts, 0);
     for ((rules, ours), said) in ours.iter().zip(&said) {
         assert_the_same(&format!("{rules:?}"), *ours, said);
     }
@@ -211,6 +218,9 @@ fn cases_with_beliefs_and_instantaneous_actions_match_storm() {
 
 #[test]
 fn worlds_with_failing_ends_match_storm() {
+    let Some(python) = python() else {
+        return;
+    };
     let file = |name: &str| {
         let path = root().join("experiments/grasp").join(name);
         fs::read_to_string(path).expect("it is there")
@@ -236,9 +246,7 @@ fn worlds_with_failing_ends_match_storm() {
     }
     // The outcomes of failures make a difference.
     assert!(ours[0].1 > ours[4].1 + 0.01, "{ours:?}");
-    let Some(said) = storm("grasp", &texts, texts.len()) else {
-        return;
-    };
+    let said = storm(python, "grasp", &texts, texts.len());
     for ((name, ours), said) in ours.iter().zip(&said) {
         assert_the_same(name, *ours, said);
     }
@@ -273,6 +281,9 @@ fn assert_within(name: &str, ours: &TimedOptimum, (upper, lower): (&StormResult,
 
 #[test]
 fn bounds_of_timed_optimum_match_storm() {
+    let Some(python) = python() else {
+        return;
+    };
     let file = |name: &str, file: &str| {
         let path = root().join("experiments").join(name).join(file);
         fs::read_to_string(path).expect("it is there")
@@ -316,9 +327,7 @@ fn bounds_of_timed_optimum_match_storm() {
             break;
         }
     }
-    let Some(said) = storm("timed", &texts, texts.len()) else {
-        return;
-    };
+    let said = storm(python, "timed", &texts, texts.len());
     for ((name, ours), said) in scenes.iter().zip(said.chunks(2)) {
         assert_within(name, ours, (&said[0], &said[1]));
     }

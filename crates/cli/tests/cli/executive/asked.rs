@@ -6,8 +6,8 @@ use std::net::TcpListener;
 use serde_json::{Value, json};
 
 use super::client::{Executive, folder};
-use super::skipped::skipped;
 use super::{command, ctl, exact, lines, python_is_there, signal, simulated, with_robot};
+use crate::skipped::skipped;
 
 /// A hanging program is named, and requests are not reported as waiting for a plan.
 #[test]

@@ -13,21 +13,13 @@ use std::time::Duration;
 use serde_json::Value;
 
 use crate::command::root;
+pub(crate) use crate::robots::folder;
 
 pub(crate) const TOKEN: &str = "a-token-of-some-length";
 
 /// Polling interval. With [`MAX_GLANCES`], polling ends after one minute.
 const GLANCE: Duration = Duration::from_millis(20);
 const MAX_GLANCES: usize = 3000;
-
-/// A folder that no other test uses.
-pub(crate) fn folder(name: &str) -> PathBuf {
-    let name = format!("elbowroom-{}-executive-{name}", std::process::id());
-    let folder = std::env::temp_dir().join(name);
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir(&folder).expect("a folder can be made");
-    folder
-}
 
 /// Writes the token to a file that only its owner can read, and returns the path.
 pub(crate) fn write_token(folder: &Path) -> String {

@@ -11,8 +11,8 @@ use serde_json::{Value, json};
 
 use super::client::{Executive, folder};
 use super::command::root;
-use super::skipped::skipped;
 use super::{DOMAIN, PROBLEM, ctl, python_is_there, signal, with_robot};
+use crate::skipped::skipped;
 
 /// A resumed executive shuts down in order, like a new one.
 #[test]

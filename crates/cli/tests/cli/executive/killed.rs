@@ -1,9 +1,8 @@
-//! Executives that are killed at random moments while goals are added and cancelled, also while
-//! their journals are rotated.
+//! Executives that are killed after a random number of journal records while goals are added and
+//! cancelled, also while their journals are rotated.
 //!
 //! `ELBOWROOM_SERVE_KILLS=100 cargo test --workspace --test cli executive::killed -- --nocapture` runs
-//! a hundred of them. The number of an executive is the seed of the requests and of the moments at
-//! which it is killed.
+//! a hundred of them. The number of an executive is the seed of the requests and of these numbers.
 
 #![allow(
     clippy::print_stdout,
@@ -13,30 +12,19 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::thread::JoinHandle;
+use std::time::Duration;
 
 use serde_json::{Value, json};
 
 use super::client::{Executive, folder};
 use super::command;
-use super::{lines, python_is_there, with_robot};
+use super::{python_is_there, with_robot};
+use crate::robots::{Rng, check_tickets, record_count};
 
 const DONE: [&str; 6] = ["a1", "a2", "a3", "b1", "b2", "b3"];
 /// Options that rotate the journal after every few actions and keep all segments.
 const SEGMENTS: [&str; 4] = ["--journal-size", "30K", "--journal-segments", "1000"];
-
-/// Pseudo-random numbers.
-struct Rng(u64);
-
-impl Rng {
-    fn below(&mut self, limit: u64) -> u64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) % limit
-    }
-}
 
 /// Requests sent to an executive, and its answers.
 #[derive(Default)]
@@ -77,14 +65,23 @@ impl SentRequests {
     }
 }
 
-/// Starts a shell that kills a process after a delay.
-fn kill_later(process: u32, milliseconds: u64) -> std::process::Child {
-    let seconds = format!("{}.{:03}", milliseconds / 1000, milliseconds % 1000);
-    Command::new("sh")
-        .args(["-c", &format!("sleep {seconds}; kill -9 {process}")])
-        .stderr(Stdio::null())
-        .spawn()
-        .expect("there is a shell")
+/// Maximum number of journal records between two kills.
+const MAX_RECORDS: u64 = 120;
+
+/// Kills a process when its journal has so many more records, in a thread.
+fn kill_after_records(process: u32, journal: &str, count: u64) -> JoinHandle<()> {
+    let journal = journal.to_owned();
+    let records = move || -> u64 { segments(&journal).iter().map(|it| record_count(it)).sum() };
+    let last = records() + count;
+    std::thread::spawn(move || {
+        for _ in 0..12_000 {
+            if records() >= last {
+                break;
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        super::kill(&process.to_string());
+    })
 }
 
 /// The segments of a journal, the first one first.
@@ -142,12 +139,12 @@ fn killed(number: u64) -> Killed {
     let kills = 3 + dice.below(4);
     for _ in 0..kills {
         let mut own = launched(&place, &journal, &beginning);
-        let mut killer = kill_later(own.process(), dice.below(4000));
+        let killer = kill_after_records(own.process(), &journal, dice.below(MAX_RECORDS));
         while asked.ask(&own, &mut dice).is_some() {
             let pause = if dice.below(3) == 0 { 1500 } else { 100 };
-            std::thread::sleep(std::time::Duration::from_millis(dice.below(pause)));
+            std::thread::sleep(Duration::from_millis(dice.below(pause)));
         }
-        killer.wait().expect("it kills");
+        killer.join().expect("it kills");
         own.kill();
         if dice.below(3) == 0 {
             super::kill(&fs::read_to_string(place.join("pid")).unwrap_or_default());
@@ -158,7 +155,7 @@ fn killed(number: u64) -> Killed {
     // Goals are only accepted after the replay of the journal. All open goals can be reached.
     let last = json!({"name": "last", "goal": "(done a1)"});
     while own.post("/v1/goals", &last).0 != 200 {
-        std::thread::sleep(std::time::Duration::from_millis(100));
+        std::thread::sleep(Duration::from_millis(100));
     }
     let is_at_rest = |state: &Value| {
         state["activity"] == "resting" && state["goals"].as_array().is_some_and(Vec::is_empty)
@@ -187,13 +184,7 @@ fn killed(number: u64) -> Killed {
             "{what}: {name} was lost: {reached:?}"
         );
     }
-    let begun = lines(&place, "begun");
-    let tickets: BTreeSet<_> = begun.iter().filter_map(|it| it.split(' ').next()).collect();
-    assert_eq!(
-        tickets.len(),
-        begun.len(),
-        "{what}: begun twice: {begun:#?}"
-    );
+    check_tickets(&place, &what);
     let mut told = Killed {
         kills,
         ..Killed::default()
@@ -304,7 +295,7 @@ fn journal_killed_during_rotation_is_resumed() {
         let name = format!("step-{step}");
         let goal = json!({"name": name, "goal": "(done a3)"});
         while own.post("/v1/facts", &undone).0 != 200 || own.post("/v1/goals", &goal).0 != 200 {
-            std::thread::sleep(std::time::Duration::from_millis(100));
+            std::thread::sleep(Duration::from_millis(100));
         }
         let begins_with_snapshot = || {
             let text = fs::read_to_string(&journal).expect("a journal");
@@ -328,9 +319,7 @@ fn journal_killed_during_rotation_is_resumed() {
     for name in ["step-3", "step-4"] {
         assert!(reached.contains(name), "{name} was lost: {reached:?}");
     }
-    let begun = lines(&place, "begun");
-    let tickets: BTreeSet<_> = begun.iter().filter_map(|it| it.split(' ').next()).collect();
-    assert_eq!(tickets.len(), begun.len(), "begun twice: {begun:#?}");
+    check_tickets(&place, "rotation");
     fs::remove_dir_all(&place).expect("the folder is there");
 }
 
@@ -351,7 +340,7 @@ fn time_passes_between_kill_and_resume() {
     if !python_is_there() {
         return;
     }
-    let pause = std::time::Duration::from_secs(3);
+    let pause = Duration::from_secs(3);
     let place = folder("time-between");
     let journal = place.join("journal").display().to_string();
     let robot = "python3 crates/cli/tests/files/forgetful.py";
@@ -392,7 +381,7 @@ fn time_passes_while_an_executive_is_idle_from_its_beginning() {
     let line = [&[super::DOMAIN, &problem], &line[..]].concat();
     let mut own = Executive::start(&place, &line);
     own.await_state(|state| state["activity"] == "resting");
-    let pause = std::time::Duration::from_secs(2);
+    let pause = Duration::from_secs(2);
     std::thread::sleep(pause);
     own.kill();
     assert_eq!(passed(&journal), Vec::<Value>::new());

@@ -8,9 +8,9 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use super::command::root;
-use super::skipped::skipped;
 use super::{awaited, beginning, check_outcome, folder, lines, python_is_there, started};
+use crate::command::root;
+use crate::skipped::skipped;
 
 /// A run can be resumed from the records written before the disk was full. Nothing was started
 /// without a record.
