@@ -188,9 +188,11 @@ impl CompareAnswer {
     /// The text does not contain results, or those of another experiment.
     pub fn read(text: &str, experiment: &AnyExperiment) -> Result<Self, ExperimentError> {
         Ok(match experiment {
-            AnyExperiment::Timed(experiment) => Self::Timed(Results::read_of(text, &**experiment)?),
+            AnyExperiment::Timed(experiment) => {
+                Self::Timed(trials::read_results(text, &**experiment)?)
+            }
             AnyExperiment::Untimed(experiment) => {
-                Self::Untimed(Results::read_of(text, &**experiment)?)
+                Self::Untimed(trials::read_results(text, &**experiment)?)
             }
         })
     }

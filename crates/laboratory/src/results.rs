@@ -7,7 +7,6 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 use crate::error::ExperimentError;
-use crate::trials::{Part, Trials};
 
 /// Results of an experiment, or of parts of it: `docs/formats/results-json.md`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -40,17 +39,14 @@ pub struct Origin {
     pub is_interrupted: bool,
 }
 
-/// Members of [`Origin`] in JSON.
-const ORIGIN: [&str; 8] = [
-    "format",
-    "version",
-    "title",
-    "fingerprint",
-    "trials",
-    "shards",
-    "parts",
-    "is_interrupted",
-];
+/// Results with counts that are not yet read.
+#[derive(Deserialize)]
+struct Stored {
+    #[serde(flatten)]
+    origin: Origin,
+    #[serde(flatten)]
+    counts: Map<String, Value>,
+}
 
 /// Counts of trials. All counts are sums, so parts add up exactly, in any order.
 pub trait Counts: Clone + Serialize + DeserializeOwned {
@@ -73,25 +69,6 @@ pub trait Counts: Clone + Serialize + DeserializeOwned {
 }
 
 impl<C: Counts> Results<C> {
-    pub(crate) fn new<E: Trials<Counts = C>>(
-        experiment: &E,
-        part: Part,
-        is_interrupted: bool,
-        counts: C,
-    ) -> Self {
-        let origin = Origin {
-            format: C::FORMAT.to_owned(),
-            version: 1,
-            title: experiment.title().to_owned(),
-            fingerprint: fingerprint(&experiment.identity(), part.trials),
-            trials: part.trials,
-            shards: part.shards,
-            parts: vec![part.shard],
-            is_interrupted,
-        };
-        Self { origin, counts }
-    }
-
     /// Reads results as JSON.
     ///
     /// # Errors
@@ -99,30 +76,14 @@ impl<C: Counts> Results<C> {
     pub fn read(text: &str) -> Result<Self, ExperimentError> {
         let wrong =
             |error: serde_json::Error| ExperimentError::other(format!("no results: {error}"));
-        let mut members: Map<String, Value> = serde_json::from_str(text).map_err(wrong)?;
-        let origin = ORIGIN.iter().filter_map(|name| members.remove_entry(*name));
-        let origin = Value::Object(origin.collect());
-        let origin: Origin = serde_json::from_value(origin).map_err(wrong)?;
-        origin.check(C::FORMAT)?;
-        let counts: C = serde_json::from_value(Value::Object(members)).map_err(wrong)?;
+        let stored: Stored = serde_json::from_str(text).map_err(wrong)?;
+        stored.origin.check(C::FORMAT)?;
+        let counts: C = serde_json::from_value(Value::Object(stored.counts)).map_err(wrong)?;
         counts.check()?;
-        Ok(Self { origin, counts })
-    }
-
-    /// Reads results of this experiment, with any number of trials.
-    pub(crate) fn read_of<E: Trials<Counts = C>>(
-        text: &str,
-        experiment: &E,
-    ) -> Result<Self, ExperimentError> {
-        let results = Self::read(text)?;
-        let own = fingerprint(&experiment.identity(), results.origin.trials);
-        if results.origin.fingerprint == own
-            && results.counts.has_shape_of(&experiment.empty_counts())
-        {
-            Ok(results)
-        } else {
-            Err(ExperimentError::WrongExperiment)
-        }
+        Ok(Self {
+            origin: stored.origin,
+            counts,
+        })
     }
 
     /// Returns the results as JSON.
@@ -154,6 +115,30 @@ impl<C: Counts> Results<C> {
 const OTHER_EXPERIMENT: &str = "these are parts of different experiments";
 
 impl Origin {
+    /// Creates the origin of the part `shard` of `shards` parts.
+    pub(crate) fn new(
+        format: &str,
+        (title, identity): (&str, &Value),
+        (trials, shard, shards): (u64, u64, u64),
+        is_interrupted: bool,
+    ) -> Self {
+        Self {
+            format: format.to_owned(),
+            version: 1,
+            title: title.to_owned(),
+            fingerprint: fingerprint(identity, trials),
+            trials,
+            shards,
+            parts: vec![shard],
+            is_interrupted,
+        }
+    }
+
+    /// Returns `true` if the experiment has this identity.
+    pub(crate) fn is_of(&self, identity: &Value) -> bool {
+        self.fingerprint == fingerprint(identity, self.trials)
+    }
+
     /// Checks the format of results, and that these parts exist.
     fn check(&self, format: &str) -> Result<(), ExperimentError> {
         if self.format != format || self.version != 1 {
@@ -240,7 +225,6 @@ fn fingerprint(identity: &Value, trials: u64) -> String {
 #[cfg(test)]
 mod tests {
     use super::{are_valid_parts, describe_trials};
-    use crate::trials::Part;
 
     #[test]
     fn number_of_trials_equals_sum_of_parts() {
@@ -250,14 +234,8 @@ mod tests {
         );
         for (trials, shards) in [(8, 3), (2, 5), (9, 3), (1, 1)] {
             for shard in 0..shards {
-                let part = Part {
-                    trials,
-                    shard,
-                    shards,
-                    jobs: 0,
-                };
                 let words = describe_trials(trials, "it", shards, &[shard]);
-                let count = part.numbers().count();
+                let count = (0..trials).filter(|trial| trial % shards == shard).count();
                 let expected =
                     format!("{count} of {trials} trials of it; parts made: {shard}/{shards}");
                 assert!(shards == 1 || words.ends_with(&expected), "{words}");

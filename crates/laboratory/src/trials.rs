@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::error::ExperimentError;
 use crate::record::{TrialRecord, TrialRecords};
-use crate::results::{Counts, Results};
+use crate::results::{Counts, Origin, Results};
 
 /// Trials to run, and the number of threads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,6 +24,16 @@ pub struct Part {
 }
 
 impl Part {
+    /// Returns all trials of an experiment.
+    pub fn whole(trials: u64, jobs: usize) -> Self {
+        Self {
+            trials,
+            shard: 0,
+            shards: 1,
+            jobs,
+        }
+    }
+
     /// Returns the numbers of the trials.
     pub(crate) fn numbers(self) -> impl Iterator<Item = u64> {
         (0..self.trials).filter(move |trial| trial % self.shards.max(1) == self.shard)
@@ -96,10 +106,10 @@ pub(crate) trait Trials: Sync {
     /// Returns counts without trials.
     fn empty_counts(&self) -> Self::Counts;
 
-    /// Returns the number of settings in which each trial is run.
+    /// Returns the number of settings of each trial.
     fn setting_count(&self) -> usize;
 
-    /// Splits the trials of a part for so many threads.
+    /// Splits the trials of a part for `threads` threads.
     fn pieces(&self, part: Part, threads: usize) -> Result<Vec<Self::Piece<'_>>, ExperimentError>;
 
     fn run_piece(
@@ -135,7 +145,7 @@ pub(crate) trait Trials: Sync {
 }
 
 /// Runs the trials of a part. The results of finished trials are kept after a stop
-/// ([`Origin::is_interrupted`](crate::results::Origin::is_interrupted)). They do not depend on the
+/// ([`Origin::is_interrupted`]). They do not depend on the
 /// number of threads.
 pub(crate) fn run<E: Trials>(
     experiment: &E,
@@ -152,5 +162,23 @@ pub(crate) fn run<E: Trials>(
     let is_whole = monitor.done.load(Ordering::Relaxed) >= experiment.count(part);
     let mut counts = experiment.combine(made, !is_whole && !monitor.may_continue())?;
     let is_finished = is_whole && pool.install(|| experiment.finish(&mut counts, part, monitor))?;
-    Ok(Results::new(experiment, part, !is_finished, counts))
+    let of_part = (part.trials, part.shard, part.shards);
+    let of_experiment = (experiment.title(), &experiment.identity());
+    Ok(Results {
+        origin: Origin::new(E::Counts::FORMAT, of_experiment, of_part, !is_finished),
+        counts,
+    })
+}
+
+/// Reads results of an experiment, with any number of trials.
+pub(crate) fn read_results<E: Trials>(
+    text: &str,
+    experiment: &E,
+) -> Result<Results<E::Counts>, ExperimentError> {
+    let results = Results::<E::Counts>::read(text)?;
+    let is_of_it = results.origin.is_of(&experiment.identity())
+        && results.counts.has_shape_of(&experiment.empty_counts());
+    is_of_it
+        .then_some(results)
+        .ok_or(ExperimentError::WrongExperiment)
 }

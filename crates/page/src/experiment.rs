@@ -152,7 +152,7 @@ pub(crate) fn document(
     }
 }
 
-/// Builds the page of an experiment with so many trials.
+/// Builds the page of an experiment; `count` states its number of trials.
 pub(crate) fn experiment(origin: &Origin, count: &str, sections: Vec<Section>) -> Document {
     let end = if origin.is_interrupted {
         "; the experiment was interrupted before it was complete"

@@ -6,6 +6,7 @@
 )]
 
 use std::fs;
+use std::io::{BufRead as _, BufReader};
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
@@ -307,7 +308,7 @@ fn interrupted_comparison_keeps_finished_trials() {
         ("perturbed", "experiments/olisipo_sf3.toml"),
     ] {
         let place = TestFiles::new(name);
-        let child = Command::new(env!("CARGO_BIN_EXE_elbowroom"))
+        let mut child = Command::new(env!("CARGO_BIN_EXE_elbowroom"))
             .current_dir(root())
             .args([
                 "compare",
@@ -319,10 +320,12 @@ fn interrupted_comparison_keeps_finished_trials() {
             ])
             .args(["--output", &place.file("results")])
             .stdout(Stdio::piped())
-            .stderr(Stdio::null())
+            .stderr(Stdio::piped())
             .spawn()
             .expect("the command can be started");
-        sleep(Duration::from_secs(4));
+        let progress = BufReader::new(child.stderr.take().expect("a pipe"));
+        let mut progress = progress.lines().map_while(Result::ok);
+        assert!(progress.any(|line| line.contains(" trials")), "{name}");
         send(&child, 2);
         let output = child.wait_with_output().expect("it ends");
         assert_eq!(output.status.code(), Some(130), "{name}: {output:?}");

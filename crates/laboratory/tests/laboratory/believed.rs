@@ -8,8 +8,7 @@ use elbowroom::answers::learn::{LearnRequest, Log, Settings, learn};
 use elbowroom::answers::run::simulate;
 use elbowroom::execute::{Candidates, Limits, NamedText, RunInputs, RunSpec, WorldNames};
 use elbowroom::report::trace::TraceWriter;
-use elbowroom_laboratory::compare::{Experiment, run};
-use elbowroom_laboratory::trials::Part;
+use elbowroom_laboratory::compare::Experiment;
 use elbowroom_model::{Situation, Task};
 use elbowroom_pddl::{Source, read_problem};
 use elbowroom_planner::embedded;
@@ -17,13 +16,7 @@ use elbowroom_sim::WorldModel;
 use indexmap::IndexMap;
 
 fn experiment(name: &str, executors: &[&str]) -> Experiment {
-    let folder = format!("{}/../../experiments", env!("CARGO_MANIFEST_DIR"));
-    let file = |path: &str| {
-        std::fs::read_to_string(format!("{folder}/{path}")).map_err(|error| error.to_string())
-    };
-    let text = file(&format!("{name}.toml")).expect("it is there");
-    let read = Experiment::read(Source::new(name, text.as_str()), &file);
-    let mut experiment = read.expect("it is an experiment");
+    let mut experiment = crate::shared::experiment(name);
     experiment.columns.truncate(1);
     Experiment {
         executors: executors
@@ -39,13 +32,7 @@ fn experiment(name: &str, executors: &[&str]) -> Experiment {
 
 /// Returns the percentage of trials in which the first executor reaches the goal, by column.
 fn reached(experiment: &Experiment, trials: u64) -> Vec<f64> {
-    let part = Part {
-        trials,
-        shard: 0,
-        shards: 1,
-        jobs: 0,
-    };
-    let results = run(experiment, part, &|_| true).expect("it runs");
+    let results = crate::shared::results(experiment, 0, trials);
     let cells = results.counts.cells[0].iter();
     let few = |count: u64| f64::from(u32::try_from(count).expect("few trials"));
     cells
@@ -135,7 +122,7 @@ fn world_learnt_from_few_logs_is_as_good_as_the_true_one() {
         &["detour", "rendezvous"]
     };
     let trials = if times.is_some() { 2000 } else { 1000 };
-    let times = times.unwrap_or(2);
+    let times = times.unwrap_or(4);
     for name in names {
         let mut experiment = experiment(name, &["policy"]);
         for count in counts {

@@ -5,35 +5,19 @@
 
 #![allow(clippy::print_stdout, reason = "the table is worth seeing")]
 
+use crate::shared::results;
 use elbowroom::execute::FirstPlan;
-use elbowroom_laboratory::compare::{Experiment, TimedCounts, run};
-use elbowroom_laboratory::results::Results;
+use elbowroom_laboratory::compare::{Experiment, run};
 use elbowroom_laboratory::trials::Part;
 use elbowroom_pddl::Source;
 
 fn experiment(name: &str, first_plan: FirstPlan) -> Experiment {
-    let folder = format!("{}/../../experiments", env!("CARGO_MANIFEST_DIR"));
-    let file = |path: &str| {
-        std::fs::read_to_string(format!("{folder}/{path}")).map_err(|error| error.to_string())
-    };
-    let text = file(&format!("{name}.toml")).expect("it is there");
-    let read = Experiment::read(Source::new(name, text.as_str()), &file);
     Experiment {
         first_plan,
         optimum: false,
         clairvoyant: false,
-        ..read.expect("it is an experiment")
+        ..crate::shared::experiment(name)
     }
-}
-
-fn results(experiment: &Experiment, jobs: usize, trials: u64) -> Results<TimedCounts> {
-    let part = Part {
-        trials,
-        shard: 0,
-        shards: 1,
-        jobs,
-    };
-    run(experiment, part, &|_| true).expect("it runs")
 }
 
 fn only(experiment: Experiment, executors: &[&str]) -> Experiment {
@@ -140,12 +124,7 @@ fn executors_start_with_the_given_plan() {
 
 #[test]
 fn plan_that_is_not_valid_for_the_problem_is_refused() {
-    let part = Part {
-        trials: 1,
-        shard: 0,
-        shards: 1,
-        jobs: 1,
-    };
+    let part = Part::whole(1, 1);
     let refused = run(&with_plan("0: (slow) [4]"), part, &|_| true);
     let error = refused.expect_err("the duration is wrong").to_string();
     assert!(error.contains("`plan` is not valid"), "{error}");

@@ -2,15 +2,14 @@
 //!
 //! `ELBOWROOM_UNTIMED_TRIALS=3000` sets the number of trials of the tests that compare shares.
 
-use std::fs;
-use std::path::Path;
-
 use elbowroom_laboratory::perturbed::{
     self, OptimumRules, PerturbedExperiment, PlannerKind, Row, StoredTrial, UntimedCounts,
     WorldKind,
 };
 use elbowroom_laboratory::results::Results;
 use elbowroom_laboratory::trials::Part;
+
+use crate::shared::experiment_file;
 
 /// Reads an experiment without optima by other rules, which take long.
 fn experiment(name: &str) -> PerturbedExperiment {
@@ -22,9 +21,7 @@ fn experiment(name: &str) -> PerturbedExperiment {
 }
 
 fn whole_experiment(name: &str) -> PerturbedExperiment {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../experiments");
-    let file = |name: &str| fs::read_to_string(folder.join(name)).map_err(|e| e.to_string());
-    PerturbedExperiment::read(&file(name).unwrap(), &file).unwrap()
+    PerturbedExperiment::read(&experiment_file(name).unwrap(), &experiment_file).unwrap()
 }
 
 /// Number of trials of the tests that compare shares.
@@ -38,19 +35,10 @@ fn deviation(probability: f64) -> f64 {
     (probability * (1.0 - probability) / f64::from(trials())).sqrt()
 }
 
-fn part(trials: u64, jobs: usize) -> Part {
-    Part {
-        trials,
-        shard: 0,
-        shards: 1,
-        jobs,
-    }
-}
-
 fn rows(name: &str, world: WorldKind) -> Vec<Row> {
     let mut experiment = experiment(name);
     experiment.worlds = vec![world];
-    perturbed::run(&experiment, part(trials().into(), 0), &|_| true)
+    perturbed::run(&experiment, Part::whole(trials().into(), 0), &|_| true)
         .unwrap()
         .counts
         .rows
@@ -61,7 +49,7 @@ fn over_all_conditions_matter_only_if_lost_facts_return() {
     let mut experiment = whole_experiment("olisipo_sf3.toml");
     experiment.worlds = vec![WorldKind::Sound];
     experiment.executors.truncate(1);
-    let results = perturbed::run(&experiment, part(1, 0), &|_| true).unwrap();
+    let results = perturbed::run(&experiment, Part::whole(1, 0), &|_| true).unwrap();
     for row in &results.counts.rows {
         let (optimum, kept) = (
             row.optimum.unwrap(),
@@ -80,7 +68,7 @@ fn optimum_depends_on_dead_end_rule() {
     experiment.worlds = vec![WorldKind::Sound];
     experiment.executors.truncate(1);
     experiment.cases.retain(|case| case.name == "AF3 p7");
-    let results = perturbed::run(&experiment, part(10, 0), &|_| true).unwrap();
+    let results = perturbed::run(&experiment, Part::whole(10, 0), &|_| true).unwrap();
     let row = &results.counts.rows[0];
     let by = |rules| row.other_optima[&rules];
     let lost = by(OptimumRules::DeadEndsLost);
@@ -174,7 +162,7 @@ fn unsupported_likelihoods_are_rejected_by_name() {
     let mut experiment = experiment("grasp.toml");
     experiment.cases.truncate(1);
     let said = |experiment: &PerturbedExperiment| {
-        let answer = perturbed::run(experiment, part(1, 1), &|_| true);
+        let answer = perturbed::run(experiment, Part::whole(1, 1), &|_| true);
         answer.unwrap_err().to_string()
     };
     let per_second = "[actions.lift]\nduring_per_second = 0.1\n";
@@ -212,12 +200,12 @@ fn olisipo_beats_esterel_and_stays_below_optimum_in_sound_world() {
 /// order.
 fn parts_add_up(experiment: &PerturbedExperiment, trials: u64) -> Results<UntimedCounts> {
     let run = |part| perturbed::run(experiment, part, &|_| true).unwrap();
-    let whole = run(part(trials, 1));
-    assert_eq!(whole, run(part(trials, 3)));
+    let whole = run(Part::whole(trials, 1));
+    assert_eq!(whole, run(Part::whole(trials, 3)));
     let shard = |shard| Part {
         shard,
         shards: 2,
-        ..part(trials, 2)
+        ..Part::whole(trials, 2)
     };
     let parts =
         [run(shard(1)), run(shard(0))].map(|part| Results::read(&part.json().to_string()).unwrap());
@@ -225,7 +213,7 @@ fn parts_add_up(experiment: &PerturbedExperiment, trials: u64) -> Results<Untime
     assert_eq!(Results::merge_results(&parts).unwrap(), whole);
     let twice = [parts[0].clone(), parts[0].clone()];
     assert!(Results::merge_results(&twice).is_err());
-    assert!(Results::merge_results(&[parts[0].clone(), run(part(trials - 1, 1))]).is_err());
+    assert!(Results::merge_results(&[parts[0].clone(), run(Part::whole(trials - 1, 1))]).is_err());
     whole
 }
 
@@ -239,12 +227,10 @@ fn results_are_independent_of_threads_and_parts() {
 
 /// Returns two cases of one of the experiments, with plans of the embedded planner.
 fn with_embedded_plans(name: &str) -> PerturbedExperiment {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../experiments");
-    let file = |name: &str| fs::read_to_string(folder.join(name)).map_err(|e| e.to_string());
-    let text = file(name).unwrap();
+    let text = experiment_file(name).unwrap();
     // Members after a table heading would belong to that table.
     let text = text.replacen("\ntrials", "\nplanner = \"embedded\"\ntrials", 1);
-    let mut read = PerturbedExperiment::read(&text, &file).unwrap();
+    let mut read = PerturbedExperiment::read(&text, &experiment_file).unwrap();
     assert_eq!(read.planner, PlannerKind::Embedded);
     read.cases = read.cases.split_off(2);
     read.cases.truncate(2);
@@ -261,7 +247,7 @@ fn embedded_plans_are_independent_of_threads_and_parts() {
             planner: PlannerKind::Shortest,
             ..experiment
         };
-        let shortest = perturbed::run(&other, part(16, 0), &|_| true).unwrap();
+        let shortest = perturbed::run(&other, Part::whole(16, 0), &|_| true).unwrap();
         assert!(
             (whole.counts.rows != shortest.counts.rows) == has_other_plans,
             "{name}"
@@ -284,7 +270,7 @@ fn no_executor_exceeds_optimum_with_embedded_plans() {
     for name in ["olisipo_sf3.toml", "olisipo_af3.toml"] {
         let mut experiment = with_embedded_plans(name);
         experiment.worlds = vec![WorldKind::Sound];
-        let rows = perturbed::run(&experiment, part(trials().into(), 0), &|_| true).unwrap();
+        let rows = perturbed::run(&experiment, Part::whole(trials().into(), 0), &|_| true).unwrap();
         for row in &rows.counts.rows {
             let (optimum, share) = (row.optimum.unwrap(), row.success.share().unwrap());
             assert!(share < optimum + 4.0 * deviation(optimum), "{row:?}");
@@ -297,7 +283,7 @@ fn no_executor_exceeds_optimum_with_embedded_plans() {
 fn failures_are_counted_by_kind_and_can_be_repeated() {
     let mut experiment = experiment("olisipo_sf3.toml");
     experiment.cases.truncate(2);
-    let made = perturbed::run(&experiment, part(60, 0), &|_| true).unwrap();
+    let made = perturbed::run(&experiment, Part::whole(60, 0), &|_| true).unwrap();
     let mut endings = std::collections::BTreeSet::new();
     for (place, row) in made.counts.rows.iter().enumerate() {
         let kinds = row.failures.kinds();
@@ -339,13 +325,13 @@ fn failures_are_counted_by_kind_and_can_be_repeated() {
 fn failure_kinds_do_not_depend_on_parts() {
     let mut experiment = experiment("olisipo_af3.toml");
     experiment.cases.truncate(1);
-    let whole = perturbed::run(&experiment, part(40, 0), &|_| true).unwrap();
+    let whole = perturbed::run(&experiment, Part::whole(40, 0), &|_| true).unwrap();
     let parts: Vec<Results<UntimedCounts>> = (0..3)
         .map(|shard| {
             let part = Part {
                 shard,
                 shards: 3,
-                ..part(40, 1)
+                ..Part::whole(40, 1)
             };
             perturbed::run(&experiment, part, &|_| true).unwrap()
         })
@@ -388,7 +374,7 @@ fn optimum_is_0_without_first_plan() {
         .to_owned())
     };
     let experiment = PerturbedExperiment::read(text, &file).unwrap();
-    let results = perturbed::run(&experiment, part(5, 1), &|_| true).unwrap();
+    let results = perturbed::run(&experiment, Part::whole(5, 1), &|_| true).unwrap();
     for row in &results.counts.rows {
         assert_eq!(row.optimum, Some(0.0), "{row:?}");
     }

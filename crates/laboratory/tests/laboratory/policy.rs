@@ -15,9 +15,8 @@ use elbowroom::execute::{Embedded, Execution};
 use elbowroom::mdp::{Policy, Settings};
 use elbowroom_execution::run::{Report, Verdict};
 use elbowroom_execution::{ActionValues, PlanAnswer, Planner};
-use elbowroom_laboratory::compare::{Experiment, TimedCounts, run};
+use elbowroom_laboratory::compare::TimedCounts;
 use elbowroom_laboratory::results::Results;
-use elbowroom_laboratory::trials::Part;
 use elbowroom_model::{Situation, Task};
 use elbowroom_num::Rational;
 use elbowroom_pddl::{Source, read_plan, read_problem};
@@ -27,29 +26,13 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::twin::SmallWorld;
 
-fn experiment(name: &str) -> Experiment {
-    let folder = format!("{}/../../experiments", env!("CARGO_MANIFEST_DIR"));
-    let file = |path: &str| {
-        std::fs::read_to_string(format!("{folder}/{path}")).map_err(|error| error.to_string())
-    };
-    let text = file(&format!("{name}.toml")).expect("it is there");
-    Experiment::read(Source::new(name, text.as_str()), &file).expect("it is an experiment")
-}
-
 fn trials() -> u64 {
     let told = std::env::var("ELBOWROOM_TRIALS").ok();
     told.map_or(200, |told| told.parse().expect("a number of trials"))
 }
 
 fn results(name: &str, jobs: usize, trials: u64) -> Results<TimedCounts> {
-    let experiment = experiment(name);
-    let part = Part {
-        trials,
-        shard: 0,
-        shards: 1,
-        jobs,
-    };
-    let results = run(&experiment, part, &|_| true).expect("it runs");
+    let results = crate::shared::results(&crate::shared::experiment(name), jobs, trials);
     println!("{name}\n{}", results.records().csv());
     for optimum in &results.counts.optimum {
         println!("optimum: {:.4} to {:.4}", optimum.lower, optimum.upper);

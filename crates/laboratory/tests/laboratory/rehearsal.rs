@@ -6,11 +6,9 @@
 
 #![allow(clippy::print_stdout, reason = "the table is worth seeing")]
 
+use crate::shared::results;
 use elbowroom::execute::FirstPlan;
-use elbowroom_laboratory::compare::{Column, Experiment, TimedCounts, run};
-use elbowroom_laboratory::results::Results;
-use elbowroom_laboratory::trials::Part;
-use elbowroom_pddl::Source;
+use elbowroom_laboratory::compare::{Column, Experiment};
 
 /// `policy`, and the executors for comparison.
 const EXECUTORS: &str = "policy live:5 adaptable guarded esterel";
@@ -21,12 +19,6 @@ fn env_or_default(name: &str, default: &str) -> String {
 
 /// Returns an experiment in which `policy` has no table.
 fn experiment(name: &str) -> Experiment {
-    let folder = format!("{}/../../experiments", env!("CARGO_MANIFEST_DIR"));
-    let file = |path: &str| {
-        std::fs::read_to_string(format!("{folder}/{path}")).map_err(|error| error.to_string())
-    };
-    let text = file(&format!("{name}.toml")).expect("it is there");
-    let read = Experiment::read(Source::new(name, text.as_str()), &file);
     let executors = env_or_default("ELBOWROOM_EXECUTORS", EXECUTORS);
     let executors = executors
         .split_whitespace()
@@ -37,18 +29,8 @@ fn experiment(name: &str) -> Experiment {
         optimum: false,
         clairvoyant: false,
         table_states: 0,
-        ..read.expect("it is an experiment")
+        ..crate::shared::experiment(name)
     }
-}
-
-fn results(experiment: &Experiment, jobs: usize, trials: u64) -> Results<TimedCounts> {
-    let part = Part {
-        trials,
-        shard: 0,
-        shards: 1,
-        jobs,
-    };
-    run(experiment, part, &|_| true).expect("it runs")
 }
 
 /// Optimum without foresight, by the bounds in docs/experiments.md, minus a tolerance of three

@@ -1,8 +1,6 @@
 //! Timed optimum for problems of the published tables.
 
-use elbowroom_laboratory::compare::{ColumnOptimum, Experiment, run};
-use elbowroom_laboratory::trials::Part;
-use elbowroom_pddl::Source;
+use elbowroom_laboratory::compare::{ColumnOptimum, Experiment};
 
 /// Returns the optimum of a table's columns for the first problem.
 fn of_first_problem(name: &str) -> Vec<ColumnOptimum> {
@@ -17,31 +15,16 @@ fn of_first_problem(name: &str) -> Vec<ColumnOptimum> {
 }
 
 fn experiment(name: &str) -> Experiment {
-    let folder = format!("{}/../../experiments", env!("CARGO_MANIFEST_DIR"));
-    let file = |path: &str| {
-        std::fs::read_to_string(format!("{folder}/{path}")).map_err(|error| error.to_string())
-    };
-    let text = file(&format!("{name}.toml")).expect("it is there");
-    let read = Experiment::read(Source::new(name, text.as_str()), &file);
     Experiment {
         executors: vec!["fixed:0".parse().expect("a name")],
         published: Vec::new(),
         optimum: true,
-        ..read.expect("it is an experiment")
+        ..crate::shared::experiment(name)
     }
 }
 
 fn optimum_of(experiment: &Experiment) -> Vec<ColumnOptimum> {
-    let part = Part {
-        trials: 1,
-        shard: 0,
-        shards: 1,
-        jobs: 0,
-    };
-    run(experiment, part, &|_| true)
-        .expect("it runs")
-        .counts
-        .optimum
+    crate::shared::results(experiment, 0, 1).counts.optimum
 }
 
 /// Both windows close at the earliest time of all problems. A policy that aims at the later one is

@@ -68,7 +68,7 @@ impl SentRequests {
 /// Maximum number of journal records between two kills.
 const MAX_RECORDS: u64 = 120;
 
-/// Kills a process when its journal has so many more records, in a thread.
+/// Kills a process, in a thread, when its journal has `count` more records.
 fn kill_after_records(process: u32, journal: &str, count: u64) -> JoinHandle<()> {
     let journal = journal.to_owned();
     let records = move || -> u64 { segments(&journal).iter().map(|it| record_count(it)).sum() };
