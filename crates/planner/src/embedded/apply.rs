@@ -18,7 +18,9 @@ use super::symbolic;
 use super::time::{NEVER, Ticks};
 use conditions::Side;
 use durations::demand_duration;
-use placement::{insert, keep_within, place_known_end, place_timed, project_past, settle};
+use placement::{
+    insert, keep_in_windows, keep_within, place_known_end, place_timed, project_past, settle,
+};
 
 /// A choice of the search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -163,13 +165,14 @@ impl<'a> Stepper<'a> {
         (is_in_time && self.has_times(state)).then_some(())
     }
 
-    /// Returns `true` if some times satisfy the demands. While a plan is extracted, the answer is
-    /// always `true`: the search has checked each of these states, and the times of the last state
-    /// satisfy all demands.
+    /// Returns `true` if some times satisfy the demands. While a plan is extracted, this is checked
+    /// only if demands may move happenings to later windows: the search has checked each of these
+    /// states, and the times of the last state satisfy all demands.
     fn has_times(&self, state: &mut State) -> bool {
         let metric = self.compiled.metric.as_ref();
         let limit = metric.zip(self.limit.as_ref());
-        self.log.is_some() || symbolic::is_possible(state, self.compiled, limit)
+        self.log.is_some() && state.network.within().is_empty()
+            || symbolic::is_possible(state, self.compiled, limit)
     }
 
     /// Returns `true` if happenings may leave the network.
@@ -231,6 +234,8 @@ impl<'a> Stepper<'a> {
             if most < NEVER {
                 state.network.add_edge(end, node, -most).ok()?;
             }
+            keep_within(state, action, [node, end], 0)?;
+            keep_in_windows(state, self.compiled.snap(action.end), end)?;
         }
         let moment = moment(state, || {
             let duration = duration_form(duration.as_ref(), node, end);

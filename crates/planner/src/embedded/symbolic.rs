@@ -9,6 +9,7 @@
 mod levels;
 mod program;
 mod projected;
+mod windows;
 
 use elbowroom_model::problem::{Comparison, UpdateOperator};
 use elbowroom_num::Rational;

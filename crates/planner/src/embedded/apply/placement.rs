@@ -168,16 +168,22 @@ pub(super) fn insert(
     for &annotation in &snap.marks {
         state.network.mark(annotation, node);
     }
-    if let Some(windows) = snap.dates.windows {
-        let within = Within {
-            windows,
-            tail: 0,
-            first: node,
-            last: node,
-        };
-        state.network.keep_within(within).ok()?;
-    }
+    keep_in_windows(state, snap, node)?;
     Some(node)
+}
+
+/// Keeps a happening in the windows of its condition.
+pub(super) fn keep_in_windows(state: &mut State, snap: &Snap, node: NodeId) -> Option<()> {
+    let Some(windows) = snap.dates.windows else {
+        return Some(());
+    };
+    let within = Within {
+        windows,
+        tail: 0,
+        first: node,
+        last: node,
+    };
+    state.network.keep_within(within).ok()
 }
 
 /// Keeps two happenings of an action in one window of its over-all condition, with `tail` remaining

@@ -33,7 +33,7 @@ impl Network {
     }
 
     /// Returns the earliest interval that contains the nodes, and whether it is the last one.
-    pub(super) fn interval_of(&self, within: Within) -> Option<(Interval, bool)> {
+    pub(crate) fn interval_of(&self, within: Within) -> Option<(Interval, bool)> {
         let last = self.earliest(within.first).max(self.earliest(within.last));
         self.windows
             .as_ref()?
@@ -58,6 +58,29 @@ impl Network {
         }
         self.within.push(within);
         self.enter_windows()
+    }
+
+    /// Returns the intervals in which the nodes may be, in ascending order.
+    pub(crate) fn fitting(&self, within: Within) -> impl Iterator<Item = Interval> + '_ {
+        let lists = self.windows.iter();
+        let intervals = lists.flat_map(move |lists| lists.list(within.windows));
+        let fits = move |(begin, end): &Interval| *begin <= end - within.tail;
+        intervals.copied().filter(fits)
+    }
+
+    /// Returns a network without windows in which each constraint by windows is replaced by an
+    /// interval. Precondition: the earliest times are within the intervals.
+    pub(crate) fn in_intervals(&self, intervals: &[Interval]) -> Self {
+        let mut network = self.clone();
+        for (within, &(begin, end)) in std::mem::take(&mut network.within).iter().zip(intervals) {
+            let floor = &mut network.nodes[within.first as usize].floor;
+            *floor = (*floor).max(begin);
+            if end < NEVER {
+                let latest = &mut network.nodes[within.last as usize].latest;
+                *latest = (*latest).min(end - within.tail);
+            }
+        }
+        network
     }
 
     /// Returns the constraints by windows.

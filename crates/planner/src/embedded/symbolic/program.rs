@@ -9,13 +9,13 @@ use elbowroom_num::{Delta, Rational};
 
 use super::super::bound::MetricBound;
 use super::super::compile::{Compiled, Metric};
-use super::super::expressions::Form;
+use super::super::expressions::{Form, Symbolic};
 use super::super::formula::Numeric;
 use super::super::network::{Network, NodeId};
 use super::super::state::State;
 use super::super::time::{NEVER, Ticks};
 use super::super::tuning::Technique;
-use super::projected;
+use super::{projected, windows};
 
 /// Exact data of the nodes of a network, which stores them in ticks.
 #[derive(Debug, Default)]
@@ -128,31 +128,57 @@ pub(crate) fn is_possible(
     if !symbolic.has_demands() && limit.is_none() {
         return true;
     }
-    // Off the grid, an undelayed happening is later than in the network.
-    let is_projected = compiled.tuning.uses(Technique::Projection)
-        && compiled.scale.units(compiled.now) == compiled.initial.time;
-    if !is_projected {
-        return has_solution(&state.network, &symbolic.demands, compiled, limit.as_ref());
-    }
-    let times = projected::times(&state.network, symbolic, compiled, limit.as_ref());
-    if let Some(symbolic) = &mut state.symbolic
-        && let Some(times) = times
-    {
+    let constraints = Constraints {
+        symbolic,
+        compiled,
+        limit: limit.as_ref(),
+    };
+    let Some(times) = windows::place(&mut state.network, &constraints) else {
+        return false;
+    };
+    if let Some(symbolic) = &mut state.symbolic {
         symbolic.times = times;
-        return true;
     }
-    false
+    true
 }
 
-/// Returns `true` if a linear program of all happenings has a solution.
-pub(super) fn has_solution(
+/// The constraints on times beyond those of the network.
+pub(super) struct Constraints<'a> {
+    pub(super) symbolic: &'a Symbolic,
+    pub(super) compiled: &'a Compiled,
+    pub(super) limit: Option<&'a Limit<'a>>,
+}
+
+impl Constraints<'_> {
+    /// Returns times of the happenings in the demands, and of `others`, that extend to times of all
+    /// happenings, and satisfy all constraints. Returns `None` if there are none.
+    pub(super) fn times(
+        &self,
+        network: &Network,
+        others: &[NodeId],
+    ) -> Option<Vec<(NodeId, Rational)>> {
+        let compiled = self.compiled;
+        // Off the grid, an undelayed happening is later than in the network.
+        let is_projected = compiled.tuning.uses(Technique::Projection)
+            && compiled.scale.units(compiled.now) == compiled.initial.time;
+        if is_projected {
+            return projected::times(network, others, self);
+        }
+        let times = all_times(network, &self.symbolic.demands, compiled, self.limit)?;
+        Some((0..).zip(times).collect())
+    }
+}
+
+/// Returns times of all happenings that solve their linear program.
+pub(super) fn all_times(
     network: &Network,
     demands: &[(Form, Comparison)],
     compiled: &Compiled,
     limit: Option<&Limit<'_>>,
-) -> bool {
-    if limit.is_none() && are_met_at_the_earliest(network, demands, compiled) {
-        return true;
+) -> Option<Vec<Rational>> {
+    let earliest = limit.is_none().then(|| earliest_times(network, demands, compiled));
+    if let Some(earliest) = earliest.flatten() {
+        return Some(earliest);
     }
     let (mut program, times, end) = program(network, demands, compiled, None);
     if let Some(limit) = limit {
@@ -160,16 +186,23 @@ pub(super) fn has_solution(
         let (difference, comparison) = limit.as_demand(&limit.spent.constant);
         assert_comparison(&mut program, &row, difference, comparison);
     }
-    program.check().is_ok()
+    program.check().ok()?;
+    Some(values(&program, &times))
 }
 
-/// Returns `true` if the earliest time of each happening satisfies all demands, without a linear
-/// program.
-fn are_met_at_the_earliest(
+fn values(program: &Simplex, variables: &[VariableId]) -> Vec<Rational> {
+    let model = program.model();
+    let values = variables.iter().map(|variable| model[variable.index()].clone());
+    values.collect()
+}
+
+/// Returns the earliest time of each happening, if these times satisfy all demands. No linear
+/// program is needed then.
+fn earliest_times(
     network: &Network,
     demands: &[(Form, Comparison)],
     compiled: &Compiled,
-) -> bool {
+) -> Option<Vec<Rational>> {
     let earliest: Vec<Rational> = network
         .bounds()
         .map(|bounds| window(bounds, compiled, None).0)
@@ -182,15 +215,30 @@ fn are_met_at_the_earliest(
         let gap = &earliest[usize::from(to)] - &earliest[usize::from(from)];
         gap >= compiled.scale.units(distance)
     };
-    demands.iter().all(is_met) && network.edges().all(is_kept)
+    (demands.iter().all(is_met) && network.edges().all(is_kept)).then_some(earliest)
 }
 
 /// Returns times that satisfy all demands and the network. Exact data replace the network's rounded
 /// numbers. The metric is minimal, and then the last happening is as early as possible.
 pub(crate) fn solve(state: &State, compiled: &Compiled, exact: &Exact) -> Option<Vec<Rational>> {
     let symbolic = state.symbolic.as_ref()?;
+    let constraints = Constraints {
+        symbolic,
+        compiled,
+        limit: None,
+    };
     let (mut program, times, end) =
         program(&state.network, &symbolic.demands, compiled, Some(exact));
+    for (node, bounds) in windows::node_bounds(&state.network, &constraints)? {
+        let (begin, end) = bounds;
+        let time = times[usize::from(node)];
+        if begin > compiled.now {
+            program.assert_lower(time, Delta::from(compiled.scale.units(begin)), 0);
+        }
+        if end < NEVER {
+            program.assert_upper(time, Delta::from(compiled.scale.units(end)), 0);
+        }
+    }
     let objective = compiled
         .metric
         .as_ref()
@@ -205,11 +253,7 @@ pub(crate) fn solve(state: &State, compiled: &Compiled, exact: &Exact) -> Option
         }
     }
     program.minimize(&[(end, Rational::ONE)]).ok()?;
-    let model = program.model();
-    let times: Vec<Rational> = times
-        .iter()
-        .map(|time| model[time.index()].clone())
-        .collect();
+    let times = values(&program, &times);
     let is_met = |(form, comparison): &(Form, Comparison)| {
         comparison.holds(&form.at(&times), &Rational::ZERO)
     };

@@ -13,11 +13,10 @@ use elbowroom_model::problem::Comparison;
 use elbowroom_num::simplex::{Simplex, VariableId};
 use elbowroom_num::{Delta, Rational};
 
-use super::super::compile::Compiled;
-use super::super::expressions::{Form, Symbolic};
+use super::super::expressions::Form;
 use super::super::network::{Network, NodeId};
 use super::super::time::{NEVER, Scale, Ticks};
-use super::program::{Limit, assert_comparison};
+use super::program::{Constraints, Limit, assert_comparison};
 
 /// Distances of a network between some of its nodes.
 struct Projected {
@@ -34,18 +33,22 @@ struct Projected {
     scale: Scale,
 }
 
-/// Returns times of the happenings in the demands that extend to times of all happenings, and
-/// satisfy all demands and the limit. Returns `None` if there are none.
+/// Returns times of the happenings in the demands, and of `others`, that extend to times of all
+/// happenings, and satisfy all demands and the limit. Returns `None` if there are none.
 pub(super) fn times(
     network: &Network,
-    symbolic: &Symbolic,
-    compiled: &Compiled,
-    limit: Option<&Limit<'_>>,
+    others: &[NodeId],
+    Constraints {
+        symbolic,
+        compiled,
+        limit,
+    }: &Constraints<'_>,
 ) -> Option<Vec<(NodeId, Rational)>> {
     let forms = symbolic.demands.iter().map(|demand| &demand.0);
     let forms = forms.chain(limit.map(|limit| &limit.spent));
     let mut nodes: Vec<NodeId> = forms
         .flat_map(|form| form.terms.iter().map(|term| term.0))
+        .chain(others.iter().copied())
         .collect();
     nodes.sort_unstable();
     nodes.dedup();
@@ -71,7 +74,7 @@ pub(super) fn times(
         if is_met(&times) && projected.allows(&times) {
             times
         } else {
-            projected.solve(&symbolic.demands, limit)?
+            projected.solve(&symbolic.demands, *limit)?
         }
     };
     Some(projected.nodes.into_iter().zip(times).collect())

@@ -56,7 +56,7 @@ impl Builder<'_> {
         let is_symbolic = is_symbolic(&self.actions, situation);
         let mut coming = self.future_timed(situation);
         let (calendars, windows, calendars_are_exact) =
-            if !is_symbolic && wanted.tuning.uses(Technique::Calendars) {
+            if wanted.tuning.uses(Technique::Calendars) {
                 let rules = strata.iter().flatten().map(|rule| &rule.body);
                 self.extract_calendars(&mut coming, situation, rules.chain([&goal]), scale)
             } else {

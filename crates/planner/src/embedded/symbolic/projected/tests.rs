@@ -7,7 +7,7 @@ use elbowroom_num::{Delta, Rational};
 use elbowroom_pddl::{Source, read_problem};
 use proptest::prelude::*;
 
-use super::super::program::{Limit, has_solution, program};
+use super::super::program::{Constraints, Limit, all_times, program};
 use super::times;
 use crate::embedded::bound::MetricBound;
 use crate::embedded::compile::Compiled;
@@ -135,9 +135,10 @@ proptest! {
             let spent = form(&compiled, count, &weights, 0);
             let limit = Limit { spent, time: Rational::from(time), bound: &bound };
             let limit = is_limited.then_some(&limit);
-            let found = times(&network, &symbolic, &compiled, limit);
-            let expected = has_solution(&network, &symbolic.demands, &compiled, limit);
-            prop_assert_eq!(found.is_some(), expected);
+            let constraints = Constraints { symbolic: &symbolic, compiled: &compiled, limit };
+            let found = times(&network, &[], &constraints);
+            let expected = all_times(&network, &symbolic.demands, &compiled, limit);
+            prop_assert_eq!(found.is_some(), expected.is_some());
             let Some(found) = found else { return Ok(()) };
             // With these times, the other happenings still have feasible times.
             let (mut whole, variables, _) = program(&network, &symbolic.demands, &compiled, None);
