@@ -40,9 +40,8 @@ impl Names {
                 .chain(&timed.deletes)
                 .for_each(|&fact| name(fact));
         }
-        for calendar in &compiled.calendars {
-            name(calendar.literal.fact());
-        }
+        let literals = compiled.calendars.iter().filter_map(|c| c.literal);
+        literals.for_each(|literal| name(literal.fact()));
         Self { facts }
     }
 

@@ -12,8 +12,8 @@ use std::str::FromStr;
 pub enum Technique {
     /// Removal of actions that are irrelevant to the goal.
     Relevance,
-    /// Facts that only timed initials change restrict the times of happenings, instead of being
-    /// changed by choices of the search.
+    /// Facts and numeric conditions that only timed initials change restrict the times of
+    /// happenings, instead of being changed by choices of the search.
     Calendars,
     /// If numbers depend on times, the linear program of a state contains only the happenings in
     /// its demands, and begins at the times found for the state before.

@@ -8,6 +8,7 @@
 )]
 
 mod calendars;
+mod calendars_with_numbers;
 mod cancellation;
 mod concurrency;
 mod deadlines;

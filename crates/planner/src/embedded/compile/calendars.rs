@@ -1,20 +1,21 @@
-//! Calendars: literals that only timed initials change, such as opening hours.
+//! Calendars: literals and numeric tests that only timed initials change, such as opening hours and
+//! the depth of water.
 //!
 //! Conditions on them restrict the times of happenings, not the states. They are removed from the
-//! conditions, and each happening stores the [windows](Windows) in which all of its calendar
-//! literals hold. The search does not branch over their timed initials.
+//! conditions. Each happening stores the [windows](Windows) of its calendars. The search does not branch over their timed initials.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Action, Snap};
 use crate::embedded::formula::{Formula, Literal};
 use crate::embedded::time::{NEVER, Ticks};
 use crate::embedded::windows::{Interval, Windows, intersection};
 
-/// A literal that only timed initials change.
+/// A literal or a numeric test that only timed initials change.
 #[derive(Clone, Debug)]
 pub(crate) struct Calendar {
-    pub(crate) literal: Literal,
+    /// `None` for a numeric test.
+    pub(crate) literal: Option<Literal>,
     /// The intervals while it holds.
     pub(crate) spans: Vec<Interval>,
 }
@@ -22,27 +23,35 @@ pub(crate) struct Calendar {
 /// Conditions on calendars.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Dates {
-    pub(crate) literals: Vec<Literal>,
-    /// The windows in which all of them hold; `None` if there are no literals.
+    /// Positions in [`Compiled::calendars`](super::Compiled::calendars).
+    pub(crate) calendars: Vec<u32>,
+    /// The common windows of all of them; `None` if there are no calendars.
     pub(crate) windows: Option<u32>,
 }
 
-/// A fact that changes at fixed times only.
-pub(super) struct DatedFact {
-    pub(super) fact: u32,
+/// A fact or a numeric test, by number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Dated {
+    Fact(u32),
+    Test(u32),
+}
+
+/// A condition whose truth changes at fixed times only.
+pub(super) struct DatedCondition {
+    pub(super) dated: Dated,
     pub(super) is_true_first: bool,
     /// Its changes in order of time; each time is rounded down and rounded up.
     pub(super) changes: Vec<(Ticks, Ticks, bool)>,
 }
 
-impl DatedFact {
+impl DatedCondition {
     /// Returns the intervals in which the literal holds.
     pub(super) fn spans(&self, truth: bool) -> Vec<Interval> {
         spans(self.is_true_first == truth, truth, &self.changes)
     }
 
     /// Returns the times at which a happening may read the literal as true: no timed initial that
-    /// writes the fact, even without a change, is closer than `epsilon`.
+    /// writes the fact or a fluent of the test, even without a change, is closer than `epsilon`.
     fn reading_times(&self, truth: bool, epsilon: Ticks) -> Vec<Interval> {
         let mut times = Vec::new();
         let mut begin = -NEVER;
@@ -113,66 +122,104 @@ pub(super) fn nested_reads<'a>(
     nested
 }
 
-/// Removes the conditions on these facts from happenings and actions, and records their windows.
-/// Returns the calendars used by the conditions.
+/// Removes these conditions from happenings and actions, and records their windows. Returns the
+/// calendars that the conditions use.
 pub(super) fn extract_conditions(
-    facts: &[DatedFact],
+    conditions: &[DatedCondition],
     epsilon: Ticks,
     actions: &mut [Action],
     snaps: &mut [Snap],
 ) -> (Vec<Calendar>, Windows) {
-    let mut windows = Windows::default();
-    let mut literals = BTreeSet::new();
-    let mut take = |formula: &mut Formula, is_throughout: bool| {
-        let of = |literal: &Literal| facts.iter().find(|dated| dated.fact == literal.fact());
-        let taken: Vec<Literal> = formula
+    let dated = conditions.iter().zip(0..);
+    let mut extraction = Extraction {
+        conditions,
+        places: dated
+            .map(|(condition, place)| (condition.dated, place))
+            .collect(),
+        epsilon,
+        numbers: BTreeMap::new(),
+        calendars: Vec::new(),
+        windows: Windows::default(),
+    };
+    for snap in snaps {
+        snap.dates = extraction.take(&mut snap.condition, false);
+    }
+    for action in actions {
+        action.dates = extraction.take(&mut action.over_all, true);
+    }
+    (extraction.calendars, extraction.windows)
+}
+
+/// The calendars and windows extracted so far.
+struct Extraction<'a> {
+    conditions: &'a [DatedCondition],
+    places: BTreeMap<Dated, usize>,
+    epsilon: Ticks,
+    /// The number of the calendar of each condition with a required truth.
+    numbers: BTreeMap<(usize, bool), u32>,
+    calendars: Vec<Calendar>,
+    windows: Windows,
+}
+
+impl Extraction<'_> {
+    /// Removes the conjuncts on calendars from a condition.
+    fn take(&mut self, formula: &mut Formula, is_throughout: bool) -> Dates {
+        let mut taken = Vec::new();
+        let places = &self.places;
+        let mut is_kept = |dated: Dated, truth: bool| {
+            let place = places.get(&dated);
+            taken.extend(place.map(|&place| (place, truth)));
+            place.is_none()
+        };
+        formula
             .literals
-            .iter()
-            .copied()
-            .filter(|literal| of(literal).is_some())
-            .collect();
+            .retain(|literal| is_kept(Dated::Fact(literal.fact()), literal.truth()));
+        formula
+            .tests
+            .retain(|&test| is_kept(Dated::Test(test), true));
         if taken.is_empty() {
             return Dates::default();
         }
-        formula.literals.retain(|literal| of(literal).is_none());
-        literals.extend(taken.iter().copied());
-        let lists = taken.iter().filter_map(|literal| {
-            let dated = of(literal)?;
-            Some(if is_throughout {
-                dated.spans(literal.truth())
+        let lists = taken.iter().map(|&(place, truth)| {
+            let condition = &self.conditions[place];
+            if is_throughout {
+                condition.spans(truth)
             } else {
-                dated.reading_times(literal.truth(), epsilon)
-            })
+                condition.reading_times(truth, self.epsilon)
+            }
         });
         let list = lists.reduce(|left, right| intersection(&left, &right));
         Dates {
-            literals: taken,
-            windows: Some(windows.number(list.unwrap_or_default())),
+            windows: Some(self.windows.number(list.unwrap_or_default())),
+            calendars: taken.into_iter().map(|taken| self.number(taken)).collect(),
         }
-    };
-    for snap in snaps {
-        snap.dates = take(&mut snap.condition, false);
     }
-    for action in actions {
-        action.dates = take(&mut action.over_all, true);
+
+    /// Returns the number of the calendar of a condition.
+    fn number(&mut self, (place, truth): (usize, bool)) -> u32 {
+        let next = u32::try_from(self.calendars.len()).expect("fewer than 2^32 calendars");
+        let number = *self.numbers.entry((place, truth)).or_insert(next);
+        if number == next {
+            let condition = &self.conditions[place];
+            self.calendars.push(Calendar {
+                literal: match condition.dated {
+                    Dated::Fact(fact) => Some(Literal::new(fact, truth)),
+                    Dated::Test(_) => None,
+                },
+                spans: condition.spans(truth),
+            });
+        }
+        number
     }
-    let calendars = literals.into_iter().filter_map(|literal| {
-        let dated = facts.iter().find(|dated| dated.fact == literal.fact())?;
-        Some(Calendar {
-            literal,
-            spans: dated.spans(literal.truth()),
-        })
-    });
-    (calendars.collect(), windows)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn dated() -> DatedFact {
-        DatedFact {
-            fact: 0,
+    fn dated() -> DatedCondition {
+        DatedCondition {
+            dated: Dated::Fact(0),
             is_true_first: false,
             changes: vec![
                 (10, 10, true),

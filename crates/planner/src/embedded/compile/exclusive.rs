@@ -10,9 +10,10 @@
 use elbowroom_model::problem::Comparison;
 use elbowroom_num::Rational;
 
+use super::reads::{visit_fluents, visit_tests};
 use super::symbols::Symbols;
-use super::{Action, Change, NONE, Rule, Snap, Timed, Update};
-use crate::embedded::formula::{Formula, Linear, Literal, Numeric, Test};
+use super::{Action, Change, NONE, Rule, Snap, Timed};
+use crate::embedded::formula::{Linear, Literal, Numeric, Test};
 
 /// The parts of the compiled problem that determine exclusive fluents.
 #[derive(Clone, Copy)]
@@ -35,9 +36,10 @@ impl Parts<'_> {
         // action.
         let mut taken: Vec<Option<Vec<u32>>> = vec![None; count];
         let mut used = Vec::new();
+        let tests = &self.symbols.tests;
         for action in self.actions {
             used.clear();
-            self.visit_fluents(action, &mut |fluent| used.push(fluent));
+            visit_fluents(action, self.snaps, tests, &mut |fluent| used.push(fluent));
             used.sort_unstable();
             used.dedup();
             for &fluent in &used {
@@ -53,7 +55,9 @@ impl Parts<'_> {
             }
         }
         for rule in self.strata.iter().flatten() {
-            self.visit_tests(&rule.body, &mut |fluent| taken[fluent as usize] = None);
+            visit_tests(&rule.body, tests, &mut |fluent| {
+                taken[fluent as usize] = None;
+            });
         }
         let mut is_lock: Vec<Option<bool>> = vec![None; self.symbols.facts.len()];
         let mut exclusive = Vec::with_capacity(count);
@@ -114,48 +118,6 @@ impl Parts<'_> {
             .filter(|action| adds(&self.snaps[action.end as usize]))
             .count();
         !is_derived && !is_timed && holders <= 1 && self.actions.iter().all(gives_back)
-    }
-
-    fn visit_tests(self, formula: &Formula, visit: &mut dyn FnMut(u32)) {
-        let tests = &self.symbols.tests;
-        formula.visit_tests(&mut |test| tests[test as usize].difference.visit_fluents(visit));
-    }
-
-    /// Calls `visit` for each fluent that the action reads or changes.
-    fn visit_fluents(self, action: &Action, visit: &mut dyn FnMut(u32)) {
-        let update = |update: &Update, visit: &mut dyn FnMut(u32)| {
-            visit(update.fluent);
-            update.value.visit_fluents(visit);
-        };
-        for snap in [action.start, action.end] {
-            let Some(snap) = self.snaps.get(snap as usize) else {
-                continue;
-            };
-            self.visit_tests(&snap.condition, visit);
-            snap.updates.iter().for_each(|own| update(own, visit));
-            for effect in &snap.conditional {
-                self.visit_tests(&effect.now, visit);
-                match &effect.change {
-                    Change::Update(own) => update(own, visit),
-                    Change::Cost(value) => value.visit_fluents(visit),
-                    Change::Add(_) | Change::Delete(_) => {}
-                }
-            }
-            if let Some(cost) = &snap.cost {
-                cost.visit_fluents(visit);
-            }
-        }
-        self.visit_tests(&action.over_all, visit);
-        for guard in &action.guards {
-            self.visit_tests(guard, visit);
-        }
-        for bound in &action.duration.bounds {
-            bound.value.visit_fluents(visit);
-        }
-        for flow in &action.flows {
-            visit(flow.fluent);
-            flow.rate.visit_fluents(visit);
-        }
     }
 }
 

@@ -154,6 +154,14 @@ impl Draft {
         });
     }
 
+    /// Calls `visit` for each fluent that the metric or an amount of its sum reads.
+    pub(super) fn visit_fluents(&self, visit: &mut impl FnMut(FluentId)) {
+        self.expression.visit_fluents(&mut *visit);
+        for amount in self.summed.values().flat_map(|sum| &sum.amounts) {
+            amount.visit_fluents(&mut *visit);
+        }
+    }
+
     /// Returns the cost of a change of a fluent in the metric's sum, or `None` if the fluent is not
     /// part of it.
     pub(super) fn cost(

@@ -3,6 +3,8 @@
 use elbowroom_model::ground::{self, Body, Change as ModelChange};
 
 use super::symbols::Symbols;
+use super::{Action, Change, Snap, Update};
+use crate::embedded::formula::{Formula, Test};
 
 /// Numbers the facts and fluents in the action's conditions.
 pub(super) fn read_action(symbols: &mut Symbols, action: &ground::Action) {
@@ -80,5 +82,52 @@ pub(super) fn visit_disputed(action: &ground::Action, visit: &mut impl FnMut(gro
             look(&body.start.effects);
             look(&body.end.effects);
         }
+    }
+}
+
+/// Calls `visit` for each fluent in the tests of a formula.
+pub(super) fn visit_tests(formula: &Formula, tests: &[Test], visit: &mut dyn FnMut(u32)) {
+    formula.visit_tests(&mut |test| tests[test as usize].difference.visit_fluents(visit));
+}
+
+/// Calls `visit` for each fluent that the compiled action reads or changes.
+pub(super) fn visit_fluents(
+    action: &Action,
+    snaps: &[Snap],
+    tests: &[Test],
+    visit: &mut dyn FnMut(u32),
+) {
+    let update = |update: &Update, visit: &mut dyn FnMut(u32)| {
+        visit(update.fluent);
+        update.value.visit_fluents(visit);
+    };
+    for snap in [action.start, action.end] {
+        let Some(snap) = snaps.get(snap as usize) else {
+            continue;
+        };
+        visit_tests(&snap.condition, tests, visit);
+        snap.updates.iter().for_each(|own| update(own, visit));
+        for effect in &snap.conditional {
+            visit_tests(&effect.now, tests, visit);
+            match &effect.change {
+                Change::Update(own) => update(own, visit),
+                Change::Cost(value) => value.visit_fluents(visit),
+                Change::Add(_) | Change::Delete(_) => {}
+            }
+        }
+        if let Some(cost) = &snap.cost {
+            cost.visit_fluents(visit);
+        }
+    }
+    visit_tests(&action.over_all, tests, visit);
+    for guard in &action.guards {
+        visit_tests(guard, tests, visit);
+    }
+    for bound in &action.duration.bounds {
+        bound.value.visit_fluents(visit);
+    }
+    for flow in &action.flows {
+        visit(flow.fluent);
+        flow.rate.visit_fluents(visit);
     }
 }

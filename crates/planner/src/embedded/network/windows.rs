@@ -60,7 +60,7 @@ impl Network {
         self.enter_windows()
     }
 
-    /// Returns the intervals in which the nodes may be, in ascending order.
+    /// Returns the possible intervals of the nodes, in ascending order.
     pub(crate) fn fitting(&self, within: Within) -> impl Iterator<Item = Interval> + '_ {
         let lists = self.windows.iter();
         let intervals = lists.flat_map(move |lists| lists.list(within.windows));
@@ -68,8 +68,7 @@ impl Network {
         intervals.copied().filter(fits)
     }
 
-    /// Returns a network without windows in which each constraint by windows is replaced by an
-    /// interval. Precondition: the earliest times are within the intervals.
+    /// Returns a network with an interval in place of each constraint by windows. Precondition: the earliest times are within the intervals.
     pub(crate) fn in_intervals(&self, intervals: &[Interval]) -> Self {
         let mut network = self.clone();
         for (within, &(begin, end)) in std::mem::take(&mut network.within).iter().zip(intervals) {

@@ -176,7 +176,9 @@ pub(super) fn all_times(
     compiled: &Compiled,
     limit: Option<&Limit<'_>>,
 ) -> Option<Vec<Rational>> {
-    let earliest = limit.is_none().then(|| earliest_times(network, demands, compiled));
+    let earliest = limit
+        .is_none()
+        .then(|| earliest_times(network, demands, compiled));
     if let Some(earliest) = earliest.flatten() {
         return Some(earliest);
     }
@@ -192,7 +194,9 @@ pub(super) fn all_times(
 
 fn values(program: &Simplex, variables: &[VariableId]) -> Vec<Rational> {
     let model = program.model();
-    let values = variables.iter().map(|variable| model[variable.index()].clone());
+    let values = variables
+        .iter()
+        .map(|variable| model[variable.index()].clone());
     values.collect()
 }
 

@@ -2,10 +2,10 @@
 //!
 //! The network moves each happening to the earliest window that the other happenings allow. A
 //! demand on numbers may need a later one: a robot that has to charge for longer arrives later. The
-//! linear program decides between windows by branch and bound (Land & Doig, Econometrica 28, 1960).
-//! Its relaxation allows all times from the first window of a happening to the last one. If the
-//! solution places a happening in a gap between two windows, it has to be before the gap or after
-//! it.
+//! linear program decides between windows by diving, as in integer programming: its relaxation
+//! allows all times from the first window of a happening to the last one. If the solution places a
+//! happening in a gap between two windows, it has to be before the gap, or after it if the
+//! relaxation then has no solution. Decisions are not revised.
 
 use elbowroom_num::Rational;
 
@@ -14,11 +14,8 @@ use super::super::time::Ticks;
 use super::super::windows::Interval;
 use super::program::Constraints;
 
-/// Maximum number of linear programs for the windows of one state.
-const MAX_PROGRAMS: u32 = 32;
-
-/// As [`MAX_PROGRAMS`], for the last state of a plan.
-const MAX_PROGRAMS_OF_PLAN: u32 = 1_024;
+/// Maximum number of decisions between windows for one state. Not measured.
+const MAX_DECISIONS: usize = 64;
 
 /// Times in windows.
 struct Placement {
@@ -30,14 +27,23 @@ struct Placement {
 
 /// Returns times of the happenings in the demands that extend to times of all happenings, and
 /// satisfy the constraints and the windows. Returns `None` if there are none, or none were found
-/// within [`MAX_PROGRAMS`]. Happenings that cannot be in an early window for any times move to a
-/// later one in the network.
+/// within [`MAX_DECISIONS`].
+///
+/// Happenings move to the selected windows in the network, and are no earlier from then on. So the
+/// windows of a state are those of the state before, except for the new happenings. Some plans are
+/// lost by that; in these problems, no search proves anything.
 pub(super) fn place(
     network: &mut Network,
     constraints: &Constraints<'_>,
 ) -> Option<Vec<(NodeId, Rational)>> {
-    let mut programs = MAX_PROGRAMS;
-    let placement = place_within(network, constraints, &mut programs)?;
+    if network.within().is_empty() {
+        return constraints.times(network, &[]);
+    }
+    let placement = select(network.clone(), constraints)?;
+    let constrained = network.within().to_vec();
+    for (within, (begin, _)) in constrained.iter().zip(placement.intervals) {
+        network.raise_earliest(within.first, begin).ok()?;
+    }
     Some(placement.times)
 }
 
@@ -50,8 +56,7 @@ pub(super) fn node_bounds(
     if network.within().is_empty() {
         return Some(Vec::new());
     }
-    let mut programs = MAX_PROGRAMS_OF_PLAN;
-    let placement = place_within(&mut network.clone(), constraints, &mut programs)?;
+    let placement = select(network.clone(), constraints)?;
     let selected = network.within().iter().zip(placement.intervals);
     let bounds = selected.flat_map(|(within, (begin, end))| {
         let latest = end - within.tail;
@@ -60,63 +65,61 @@ pub(super) fn node_bounds(
     Some(bounds.collect())
 }
 
-fn place_within(
-    network: &mut Network,
-    constraints: &Constraints<'_>,
-    programs: &mut u32,
-) -> Option<Placement> {
-    loop {
-        *programs = programs.checked_sub(1)?;
-        let earliest = intervals(network, |_, current| current)?;
-        let times = if earliest.is_empty() {
-            constraints.times(network, &[])
-        } else {
-            constraints.times(&network.in_intervals(&earliest), &[])
-        };
-        if let Some(times) = times {
-            return Some(Placement {
-                times,
-                intervals: earliest,
-            });
+/// Selects an interval for each constraint by windows.
+fn select(mut network: Network, constraints: &Constraints<'_>) -> Option<Placement> {
+    for _ in 0..MAX_DECISIONS {
+        let intervals = current_intervals(&network)?;
+        if let Some(times) = constraints.times(&network.in_intervals(&intervals), &[]) {
+            return Some(Placement { times, intervals });
         }
-        if earliest.is_empty() {
-            return None;
-        }
-        *programs = programs.checked_sub(1)?;
-        let last_end = |within: &Within, (begin, end): Interval| {
-            let last = network.fitting(*within).last();
-            (begin, last.map_or(end, |last| last.1))
-        };
-        let relaxed = intervals(network, last_end)?;
-        let constrained = network.within().iter();
-        let nodes: Vec<NodeId> = constrained.flat_map(|w| [w.first, w.last]).collect();
-        let times = constraints.times(&network.in_intervals(&relaxed), &nodes)?;
-        let gap = match selected_intervals(network, constraints, &times) {
+        let (relaxed, nodes) = relaxation(&network, &intervals);
+        // Most states without times are detected without the happenings in windows.
+        constraints.times(&relaxed, &[])?;
+        let times = constraints.times(&relaxed, &nodes)?;
+        let gap = match selected_intervals(&network, &intervals, constraints, &times) {
             Ok(intervals) => return Some(Placement { times, intervals }),
             Err(gap) => gap,
         };
-        let mut before = network.clone();
-        if let Some(latest) = gap.latest_before
-            && before.lower_latest(gap.within.last, latest).is_ok()
-            && let Some(placement) = place_within(&mut before, constraints, programs)
-        {
-            return Some(placement);
+        match earlier_network(&network, &gap, constraints) {
+            Some(earlier) => network = earlier,
+            None => network.raise_earliest(gap.within.first, gap.end).ok()?,
         }
-        network.raise_earliest(gap.within.first, gap.end).ok()?;
     }
+    None
 }
 
-/// Returns an interval for each constraint by windows, derived from the one of the earliest times.
-fn intervals(
-    network: &Network,
-    derive: impl Fn(&Within, Interval) -> Interval,
-) -> Option<Vec<Interval>> {
+/// Returns the network with the happenings before the gap, if the relaxed problem then has times.
+fn earlier_network(network: &Network, gap: &Gap, constraints: &Constraints<'_>) -> Option<Network> {
+    let mut earlier = network.clone();
+    earlier
+        .lower_latest(gap.within.last, gap.latest_before?)
+        .ok()?;
+    let intervals = current_intervals(&earlier)?;
+    let (relaxed, _) = relaxation(&earlier, &intervals);
+    constraints.times(&relaxed, &[]).map(|_| earlier)
+}
+
+/// Returns the interval of each constraint by windows at the earliest times.
+fn current_intervals(network: &Network) -> Option<Vec<Interval>> {
     let constrained = network.within().iter();
-    let intervals = constrained.map(|within| {
-        let (current, _) = network.interval_of(*within)?;
-        Some(derive(within, current))
-    });
+    let intervals = constrained.map(|&within| Some(network.interval_of(within)?.0));
     intervals.collect()
+}
+
+/// Returns the network with happenings bounded by the beginning of their current interval and the
+/// end of the last one. Also returns the happenings with a later interval.
+fn relaxation(network: &Network, current: &[Interval]) -> (Network, Vec<NodeId>) {
+    let mut nodes = Vec::new();
+    let constrained = network.within().iter().zip(current);
+    let relaxed = constrained.map(|(&within, &(begin, end))| {
+        let last = network.fitting(within).last().map_or(end, |last| last.1);
+        if last > end {
+            nodes.extend([within.first, within.last]);
+        }
+        (begin, last)
+    });
+    let relaxed: Vec<Interval> = relaxed.collect();
+    (network.in_intervals(&relaxed), nodes)
 }
 
 /// A gap between two intervals that contains happenings.
@@ -130,19 +133,24 @@ struct Gap {
 /// Returns the intervals that contain the happenings at these times, or the first gap that does.
 fn selected_intervals(
     network: &Network,
+    current: &[Interval],
     constraints: &Constraints<'_>,
     times: &[(NodeId, Rational)],
 ) -> Result<Vec<Interval>, Gap> {
     let scale = constraints.compiled.scale;
     let time_of = |node: NodeId| {
         let place = times.binary_search_by_key(&node, |entry| entry.0);
-        let place = place.expect("the program contains all happenings with windows");
-        &times[place].1
+        place.ok().map(|place| &times[place].1)
     };
     let mut gaps = Vec::new();
     let mut selected = Vec::new();
-    for &within in network.within() {
-        let (first, last) = (time_of(within.first), scale.ceil(time_of(within.last)).0);
+    for (&within, &current) in network.within().iter().zip(current) {
+        let (Some(first), Some(last)) = (time_of(within.first), time_of(within.last)) else {
+            // No later interval.
+            selected.push(current);
+            continue;
+        };
+        let last = scale.ceil(last).0;
         let mut latest_before = None;
         let interval = network.fitting(within).find(|(_, end)| {
             let is_reached = last <= end - within.tail;

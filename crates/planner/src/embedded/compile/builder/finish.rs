@@ -55,13 +55,14 @@ impl Builder<'_> {
         let (strata, derived) = self.rules(grounding);
         let is_symbolic = is_symbolic(&self.actions, situation);
         let mut coming = self.future_timed(situation);
-        let (calendars, windows, calendars_are_exact) =
-            if wanted.tuning.uses(Technique::Calendars) {
-                let rules = strata.iter().flatten().map(|rule| &rule.body);
-                self.extract_calendars(&mut coming, situation, rules.chain([&goal]), scale)
-            } else {
-                (Vec::new(), Windows::default(), true)
-            };
+        let (calendars, windows, calendars_are_exact) = if wanted.tuning.uses(Technique::Calendars)
+        {
+            let rules = strata.iter().flatten().map(|rule| &rule.body);
+            let others: Vec<_> = rules.chain([&goal]).collect();
+            self.extract_calendars(&mut coming, situation, &others, scale)
+        } else {
+            (Vec::new(), Windows::default(), true)
+        };
         let windows = (!windows.is_empty()).then(|| Arc::new(windows));
         let annotations = Annotations::of(self.separations.iter().chain(&coming.separations));
         self.annotate(&annotations, &coming, may_continue)?;

@@ -1,4 +1,4 @@
-//! Literals that change at fixed times only, and the resulting windows.
+//! Literals and tests that change at fixed times only, and the resulting windows.
 
 use std::ops::Range;
 
@@ -8,7 +8,7 @@ use super::super::super::time::{NEVER, Ticks};
 use super::actions::{Draft, least_ticks, most_ticks};
 use super::{Graph, Kind, narrow};
 
-/// A literal that changes at fixed times only and that an operator needs.
+/// A literal or test that changes at fixed times only and that an operator needs.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Window {
     /// Position in [`Graph::timetable`].
@@ -31,7 +31,7 @@ impl Graph {
         std::mem::replace(&mut self.timetable[number], vec![(-NEVER, NEVER)])
     }
 
-    /// Returns the literal of a timetable.
+    /// Returns the literal of a timetable, or `None` if it is that of a test.
     pub(crate) fn timetable_literal(&self, number: usize) -> Option<Literal> {
         let number = narrow(number);
         let place = self
@@ -51,6 +51,7 @@ impl Graph {
     /// Finds the literals that only timed initials change.
     pub(super) fn add_timetables(&mut self, compiled: &Compiled) {
         self.timetable_of = vec![NONE; 2 * compiled.facts.len()];
+        // The timetables of calendars have the numbers of the calendars.
         for calendar in &compiled.calendars {
             self.add_timetable(calendar.literal, calendar.spans.clone());
         }
@@ -86,13 +87,15 @@ impl Graph {
             for truth in [true, false] {
                 let holds = compiled.initial.facts[fact as usize] == truth;
                 let spans = spans(holds, truth, &changes);
-                self.add_timetable(Literal::new(fact, truth), spans);
+                self.add_timetable(Some(Literal::new(fact, truth)), spans);
             }
         }
     }
 
-    fn add_timetable(&mut self, literal: Literal, spans: Vec<(Ticks, Ticks)>) {
-        self.timetable_of[literal.index()] = narrow(self.timetable.len());
+    fn add_timetable(&mut self, literal: Option<Literal>, spans: Vec<(Ticks, Ticks)>) {
+        if let Some(literal) = literal {
+            self.timetable_of[literal.index()] = narrow(self.timetable.len());
+        }
         self.timetable.push(spans);
     }
 
@@ -106,8 +109,9 @@ impl Graph {
         let least = least_ticks(compiled, draft.action);
         let most = most_ticks(compiled, draft.action);
         let mut add = |(formula, dates): (&Formula, &Dates), lead: Ticks, tail: Ticks| {
-            for literal in formula.literals.iter().chain(&dates.literals) {
-                let timetable = self.timetable_of[literal.index()];
+            let literals = formula.literals.iter();
+            let timetables = literals.map(|literal| self.timetable_of[literal.index()]);
+            for timetable in timetables.chain(dates.calendars.iter().copied()) {
                 if timetable != NONE {
                     self.windows.push(Window {
                         timetable,
