@@ -42,13 +42,13 @@ impl Builder<'_> {
         dated.extend(self.dated_tests(coming, situation, scale));
         let (calendars, windows) =
             extract_conditions(&dated, self.epsilon, &mut self.actions, &mut self.snaps);
-        let fluents = self.other_fluents(others);
+        let fluents = self.calendar_fluents(coming, others);
         let mut are_exact = true;
         for happening in &mut coming.happenings {
             let count = happening.changes.len();
             happening.changes.retain(|change| match change {
                 Change::Add(fact) | Change::Delete(fact) => !facts.contains(fact),
-                Change::Update { fluent, .. } => fluents.contains(fluent),
+                Change::Update { fluent, .. } => !fluents.contains(fluent),
             });
             are_exact &=
                 happening.changes.len() == count || scale.exactly(&happening.time).is_some();
@@ -201,12 +201,13 @@ impl Builder<'_> {
         (timed, written)
     }
 
-    /// Returns the fluents that the metric, these formulas or the actions without their conditions
-    /// on calendars read or change.
-    fn other_fluents(&self, formulas: &[&Formula]) -> BTreeSet<FluentId> {
-        let mut read = BTreeSet::new();
+    /// Returns the fluents that only timed initials change, and that only conditions on calendars
+    /// read. These conditions have been removed; `formulas` are those outside of actions.
+    fn calendar_fluents(&self, coming: &FutureTimed, formulas: &[&Formula]) -> BTreeSet<FluentId> {
+        let (mut fluents, written) = self.timed_fluents(coming);
+        fluents.retain(|fluent| !written.contains(fluent));
         let mut visit = |fluent: u32| {
-            read.insert(self.symbols.fluents[fluent as usize]);
+            fluents.remove(&fluent);
         };
         let tests = &self.symbols.tests;
         for formula in formulas {
@@ -215,12 +216,16 @@ impl Builder<'_> {
         for action in &self.actions {
             visit_fluents(action, &self.snaps, tests, &mut visit);
         }
+        let numbers = fluents.into_iter();
+        let mut fluents: BTreeSet<FluentId> = numbers
+            .map(|fluent| self.symbols.fluents[fluent as usize])
+            .collect();
         if let Some(metric) = &self.metric {
             metric.visit_fluents(&mut |fluent| {
-                read.insert(fluent);
+                fluents.remove(&fluent);
             });
         }
-        read
+        fluents
     }
 
     /// Returns the facts that only timed initials change, and that are read only as conjuncts of
