@@ -24,6 +24,8 @@ import subprocess
 import sys
 import time
 
+import executor_worlds
+
 DEVIATIONS = (1, 10, 30)
 
 
@@ -341,7 +343,7 @@ def main():
     parser.add_argument("--executors", default="live,esterel,stn")
     arguments = parser.parse_args()
     executors = arguments.executors.split(",")
-    worlds = {**own_worlds(), **data_worlds(arguments.data)}
+    worlds = {**own_worlds(), **executor_worlds.worlds(), **data_worlds(arguments.data)}
     names = [it for it in worlds if arguments.only in it]
     # Random order, so that all kinds are tested if the time does not suffice for all.
     random.Random(1).shuffle(names)

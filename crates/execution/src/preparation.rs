@@ -23,6 +23,8 @@ use crate::forward::forward_port;
 /// A plan prepared for execution.
 #[derive(Clone, Debug)]
 pub struct PreparationResult {
+    /// The given plan, or one of the same steps that start later.
+    pub time_triggered: TimeTriggeredPlan,
     /// The deordered plan, with open parameters.
     pub plan: ParametrizedPlan,
     /// For each step of the given plan, its instance.
@@ -130,7 +132,7 @@ impl PreparationRequest<'_> {
             task,
             origin: self.situation.time.clone(),
             now: self.now.clone(),
-            time_triggered: plan,
+            time_triggered: ready.time_triggered,
             plan: ready.plan,
             instances: ready.instances,
             nominal: ready.nominal,

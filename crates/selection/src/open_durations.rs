@@ -3,11 +3,12 @@
 use std::collections::BTreeSet;
 
 use elbowroom_envelope::pipeline;
+use elbowroom_execution::PreparationResult;
 use elbowroom_model::Task;
 use elbowroom_num::{Interval, Rational};
 use elbowroom_plan::{
-    DecoupledEnvelope, InstanceId, NodeId, ParameterId, ParameterKind, ParametrizedPlan, Reason,
-    Schedule, Side, StnPlan, Valuation, network_node,
+    InstanceId, NodeId, ParameterId, ParameterKind, ParametrizedPlan, Reason, Schedule, Side,
+    StnPlan, Valuation, network_node,
 };
 use elbowroom_stn::{ConsistentNetwork, Constraint, Network};
 
@@ -27,20 +28,19 @@ fn open_durations(plan: &StnPlan) -> BTreeSet<InstanceId> {
     open.collect()
 }
 
-/// Moves open durations away from the ends of their intervals in the envelope.
+/// Moves open durations away from the ends of their intervals in the envelope. Returns `false` if
+/// none is moved.
 ///
 /// Planners choose them as short or as long as the domain and the goal permit, so that the smallest
 /// deviation breaks the plan. Every value in the envelope has the same guarantee as the planned
 /// one. However, the envelope may permit durations outside the domain's bounds, which may depend on
 /// values that another duration changes. So no duration is changed unless the plan `given`, which
 /// includes these bounds, is valid with all new values.
-pub(super) fn choose(
-    task: &Task,
-    given: &StnPlan,
-    plan: &mut ParametrizedPlan,
-    nominal: &mut Schedule,
-    envelope: &DecoupledEnvelope,
-) {
+pub(super) fn choose(task: &Task, given: &StnPlan, prepared: &mut PreparationResult) -> bool {
+    let Some(envelope) = &prepared.envelope else {
+        return false;
+    };
+    let (plan, nominal) = (&mut prepared.plan, &mut prepared.nominal);
     let open = open_durations(given);
     let before = plan.nominal();
     let mut chosen = before.clone();
@@ -54,18 +54,19 @@ pub(super) fn choose(
         }
     }
     if chosen == before {
-        return;
+        return false;
     }
     let Some(schedule) = schedule_at(plan, nominal, &chosen) else {
-        return;
+        return false;
     };
     if !pipeline::validate_plan(task, &given.scheduled(&schedule)).is_valid() {
-        return;
+        return false;
     }
     for (parameter, value) in plan.parameters.iter_mut().zip(&chosen) {
         parameter.nominal.clone_from(value);
     }
     *nominal = schedule;
+    true
 }
 
 /// Returns a value near this one with slack in the interval: 1/8 of the value at both ends and, if

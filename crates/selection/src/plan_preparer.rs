@@ -27,7 +27,9 @@ use elbowroom_stn::ConsistentNetwork;
 use crate::box_search::EnvelopeSettings;
 use crate::box_search::grow;
 use crate::open_durations;
+use crate::postponement;
 use crate::propositional::{to_propositional, with_fixed_durations};
+use crate::slack;
 use crate::timeouts::PlannedTimeout;
 use crate::vary::is_about_an_absent_action;
 
@@ -37,6 +39,9 @@ pub struct PlanPreparer {
     settings: EnvelopeSettings,
     limit: Option<Limit>,
 }
+
+/// Maximum number of times that open durations are chosen for a plan, each with a new envelope.
+const MAX_CHOICES: usize = 4;
 
 /// Decides whether the computation of an envelope continues.
 type Limit = Arc<dyn Fn() -> ControlFlow<()> + Send + Sync>;
@@ -119,6 +124,7 @@ impl PlanPreparer {
             deordered.plan.instances[instance.index()].action = step.action.clone();
         }
         Ok(PreparationResult {
+            time_triggered: plan.clone(),
             plan: ParametrizedPlan::closed(task, deordered.plan),
             instances: deordered.instances,
             nominal: deordered.nominal,
@@ -152,8 +158,29 @@ impl PlanPreparer {
 }
 
 impl Preparer for PlanPreparer {
+    /// Of a plan with an open network, the starts of some actions are postponed if that gives it
+    /// more slack.
     fn prepare(
         &mut self,
+        task: &Arc<Task>,
+        plan: &TimeTriggeredPlan,
+        need: PlanForm,
+    ) -> Result<PreparationResult, PrepareError> {
+        let prepared = self.prepare_as_given(task, plan, need)?;
+        if need != PlanForm::OpenNetwork || !prepared.plan.durations_move_numbers() {
+            return Ok(prepared);
+        }
+        let postponed = postponement::postpone(task, plan);
+        let postponed = postponed.and_then(|later| self.prepare_as_given(task, &later, need).ok());
+        let is_better = |later: &PreparationResult| slack::has_more_slack(later, &prepared);
+        Ok(postponed.filter(is_better).unwrap_or(prepared))
+    }
+}
+
+impl PlanPreparer {
+    /// Prepares the plan with its own starts as planned times.
+    fn prepare_as_given(
+        &self,
         task: &Arc<Task>,
         plan: &TimeTriggeredPlan,
         need: PlanForm,
@@ -167,7 +194,8 @@ impl Preparer for PlanPreparer {
         if is_about_orders {
             return Self::orderings(task, plan, need);
         }
-        let mut nominal = freed.nominal.clone();
+        let time_triggered = plan.clone();
+        let nominal = freed.nominal.clone();
         let instances = freed.instances.clone();
         let given = freed.plan.clone();
         let plan = Arc::new(match need {
@@ -186,18 +214,45 @@ impl Preparer for PlanPreparer {
             PlanForm::OpenNetwork => self.envelope(task, &plan, &nominal).ok(),
             PlanForm::Orderings | PlanForm::PartialOrder | PlanForm::Network => None,
         };
-        let mut plan = Arc::unwrap_or_clone(plan);
-        if let Some(envelope) = envelope.as_ref().filter(|_| need == PlanForm::OpenNetwork) {
-            open_durations::choose(task, &given, &mut plan, &mut nominal, envelope);
-        }
-        Ok(PreparationResult {
-            plan,
+        let prepared = PreparationResult {
+            time_triggered,
+            plan: Arc::unwrap_or_clone(plan),
             instances,
             nominal,
             envelope,
             forms: DispatchableCache::default(),
             order: None,
+        };
+        Ok(match need {
+            PlanForm::OpenNetwork => self.with_open_durations(task, &given, prepared),
+            _ => prepared,
         })
+    }
+
+    /// Moves the durations that the domain leaves open away from the ends of their intervals, with
+    /// a new envelope around them if that has more slack.
+    fn with_open_durations(
+        &self,
+        task: &Arc<Task>,
+        given: &StnPlan,
+        mut prepared: PreparationResult,
+    ) -> PreparationResult {
+        for _ in 0..MAX_CHOICES {
+            if !open_durations::choose(task, given, &mut prepared) {
+                break;
+            }
+            let plan = Arc::new(prepared.plan.clone());
+            let envelope = self.envelope(task, &plan, &prepared.nominal).ok();
+            let wider = PreparationResult {
+                envelope,
+                ..prepared.clone()
+            };
+            if !slack::has_more_slack(&wider, &prepared) {
+                break;
+            }
+            prepared = wider;
+        }
+        prepared
     }
 }
 

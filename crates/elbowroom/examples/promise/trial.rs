@@ -75,6 +75,7 @@ impl<'a> Ready<'a> {
         Ok(Self {
             subject,
             network: PreparationResult {
+                time_triggered: subject.plan.clone(),
                 plan: closed,
                 instances: instances.clone(),
                 nominal: nominal.clone(),
@@ -83,6 +84,7 @@ impl<'a> Ready<'a> {
                 order: None,
             },
             open: PreparationResult {
+                time_triggered: subject.plan.clone(),
                 plan: Arc::unwrap_or_clone(open),
                 instances,
                 nominal,

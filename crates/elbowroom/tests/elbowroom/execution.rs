@@ -33,6 +33,7 @@ mod scene;
 mod shutdown;
 mod simultaneous_happenings;
 mod spec;
+mod start_times;
 mod stepwise;
 mod third_party_problems;
 mod timeouts;

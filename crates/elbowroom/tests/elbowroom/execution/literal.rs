@@ -58,11 +58,12 @@ impl Preparer for IdentityPreparer {
     fn prepare(
         &mut self,
         task: &Arc<Task>,
-        _plan: &TimeTriggeredPlan,
+        given: &TimeTriggeredPlan,
         _need: PlanForm,
     ) -> Result<PreparationResult, PrepareError> {
         let plan = StnPlan::unconstrained(task, Vec::new());
         Ok(PreparationResult {
+            time_triggered: given.clone(),
             instances: Vec::new(),
             nominal: plan.nodes.iter().map(|_| Rational::ZERO).collect(),
             plan: ParametrizedPlan {

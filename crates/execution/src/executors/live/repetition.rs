@@ -2,7 +2,8 @@
 //!
 //! In the same state the planner returns the same plan, however often the world's durations have
 //! violated it. If they deviate in the same way each time, its guarantee is useless. So every other
-//! attempt after the second is executed by the plan's orderings, without a guarantee.
+//! attempt after the second is executed by the plan's orderings, without a guarantee. The same
+//! applies to a few plans that are adopted alternately.
 
 use std::collections::BTreeMap;
 
@@ -18,13 +19,16 @@ use crate::reason::Reason;
 /// Number of attempts with a guarantee before the first one without.
 const GUARANTEED_ATTEMPTS: usize = 2;
 
-/// Consecutive attempts to execute the same plan.
+/// Maximum number of plans whose attempts are counted.
+const MAX_PLANS: usize = 4;
+
+/// Consecutive attempts to execute the same plans.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Repetition {
-    /// The present plan, with times from its beginning.
-    plan: TimeTriggeredPlan,
-    /// The number of times that it was abandoned for lack of time, or after an untimely end.
-    abandoned: usize,
+    /// The plans since one was last not abandoned for one of these reasons, with times from their
+    /// beginnings, the present one last. With each, the number of times that it was abandoned for
+    /// lack of time, or after an untimely end.
+    plans: Vec<(TimeTriggeredPlan, usize)>,
     /// `true` if the present attempt was abandoned for one of these reasons.
     has_ended: bool,
     /// `true` if an action of the present attempt has ended earlier or later than planned.
@@ -34,12 +38,16 @@ pub(super) struct Repetition {
 impl Repetition {
     /// Records the adoption of a plan.
     pub(super) fn note_adopted(&mut self, plan: &TimeTriggeredPlan) {
-        if !self.has_ended || self.plan != *plan {
-            *self = Self {
-                plan: plan.clone(),
-                ..Self::default()
-            };
+        if !self.has_ended {
+            self.plans.clear();
         }
+        let mut known = self.plans.extract_if(.., |(known, _)| known == plan);
+        let abandoned = known.next().map_or(0, |(_, abandoned)| abandoned);
+        drop(known);
+        if self.plans.len() == MAX_PLANS {
+            self.plans.remove(0);
+        }
+        self.plans.push((plan.clone(), abandoned));
         self.has_ended = false;
         self.is_untimely = false;
     }
@@ -53,15 +61,18 @@ impl Repetition {
     /// Records that the present plan is abandoned.
     pub(super) fn note_abandoned(&mut self, reason: &Reason) {
         if !self.has_ended && (self.is_untimely || guarantee_status::lacks_time(reason)) {
-            self.abandoned += 1;
+            if let Some((_, abandoned)) = self.plans.last_mut() {
+                *abandoned += 1;
+            }
             self.has_ended = true;
         }
     }
 
     /// Returns `true` if the present plan is to be executed by its orderings alone.
     pub(super) fn is_by_orderings(&self) -> bool {
-        self.abandoned
-            .checked_sub(GUARANTEED_ATTEMPTS)
+        let present = self.plans.last();
+        present
+            .and_then(|(_, abandoned)| abandoned.checked_sub(GUARANTEED_ATTEMPTS))
             .is_some_and(|more| more.is_multiple_of(2))
     }
 }

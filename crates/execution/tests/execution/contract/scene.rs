@@ -109,6 +109,7 @@ impl Preparer for ManualPreparer {
         let twice = twice.collect();
         let envelope = is_open.then(|| DecoupledEnvelope::new(&prepared, twice));
         Ok(PreparationResult {
+            time_triggered: plan.clone(),
             plan: prepared,
             instances,
             nominal,
