@@ -108,7 +108,7 @@ pub(crate) fn what_if(
         .take();
     let verdict = match &goal {
         _ if refused.is_some() => "impossible".to_owned(),
-        Some(goal) if is_over => goal.state.clone(),
+        Some(goal) if is_over && is_decided(&goal.state) => goal.state.clone(),
         _ => "undecided".to_owned(),
     };
     let missed = goals_in(&after, &MISSED_STATES);
@@ -130,6 +130,11 @@ pub(crate) fn what_if(
             .collect(),
         verdict,
     })
+}
+
+/// Returns `true` if a goal in this state is closed or has no plan.
+fn is_decided(state: &str) -> bool {
+    FINAL_STATES.contains(&state) || MISSED_STATES.contains(&state)
 }
 
 /// Executes the simulation until the goal has its final state.

@@ -426,8 +426,7 @@ impl StatusData {
                     }
                     Some(verdict) => {
                         let is_certain = **verdict == Verdict::Unsolvable;
-                        self.goals
-                            .mark_unplanned(is_certain, &reasons.join("; "), now);
+                        self.goals.mark_unplanned(is_certain, dead_end, now);
                         let why = verdict.why().map(str::to_owned).into_iter().chain(reasons);
                         let why: Vec<String> = why.collect();
                         let words = verdict_text(verdict);
