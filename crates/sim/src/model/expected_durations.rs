@@ -14,14 +14,14 @@ const SEED: u64 = 0x6d65_616e_0000_0000;
 
 impl WorldModel {
     /// Returns the mean durations of actions, in the form for plans, with three significant digits. Delays before the
-    /// starts are not included.
-    pub fn expected_durations(&self) -> ExpectedDurations {
+    /// starts are not included. A mean in seconds that is not above `epsilon`, the separation of happenings, is too
+    /// short for plans, which then have the duration of the domain.
+    pub fn expected_durations(&self, epsilon: &Rational) -> ExpectedDurations {
         let rules = self.durations.iter().map(|(actions, rule)| {
-            // A mean that is not positive is no duration to plan with.
             let (factor, seconds) = match (rule.expected(), rule.is_relative) {
                 (Some(mean), true) => (mean, Rational::ZERO),
-                (Some(mean), false) => (Rational::ZERO, mean),
-                (None, _) => (Rational::ONE, Rational::ZERO),
+                (Some(mean), false) if mean > *epsilon => (Rational::ZERO, mean),
+                _ => (Rational::ONE, Rational::ZERO),
             };
             ExpectedDuration {
                 actions: actions.clone(),
@@ -113,6 +113,7 @@ impl Distribution {
 
 #[cfg(test)]
 mod tests {
+    use elbowroom_model::pattern::ActionPattern;
     use elbowroom_num::Rational;
 
     use super::Rule;
@@ -160,9 +161,9 @@ mod tests {
                     is_relative: true,
                 };
                 let mut world = WorldModel::without_deviations();
-                let all = elbowroom_model::pattern::ActionPattern::new(None, None);
+                let all = ActionPattern::new(None, None);
                 world.durations.push((all, rule));
-                let rule = &world.expected_durations().rules[0];
+                let rule = &world.expected_durations(&Rational::ZERO).rules[0];
                 let expected = &planned * &rule.factor + &rule.seconds;
                 let around = world.around_expected_durations();
                 let (mut sum, count) = (0.0, 4000);
@@ -184,6 +185,25 @@ mod tests {
                     "{distribution:?} {maximum:?}: {mean} {expected}"
                 );
             }
+        }
+    }
+
+    #[test]
+    fn too_short_means_leave_the_durations_of_the_domain() {
+        let epsilon = Rational::new(1, 1000);
+        let cases = [("0", true), ("0.001", true), ("0.002", false)];
+        for (mean, is_domain) in cases {
+            let rule = Rule {
+                distribution: Distribution::Constant(mean.parse().expect("a number")),
+                minimum: None,
+                maximum: None,
+                is_relative: false,
+            };
+            let mut world = WorldModel::without_deviations();
+            world.durations.push((ActionPattern::new(None, None), rule));
+            let rule = &world.expected_durations(&epsilon).rules[0];
+            assert_eq!(rule.factor == Rational::ONE, is_domain, "{mean}");
+            assert_eq!(rule.seconds.is_zero(), is_domain, "{mean}");
         }
     }
 }

@@ -92,7 +92,7 @@ impl RunSpec {
     ) -> (Arc<Task>, Option<WorldModel>) {
         match beliefs {
             Some(world) if self.plans_believed_durations => (
-                Arc::new(task.with_expected_durations(world.expected_durations())),
+                Arc::new(task.with_expected_durations(world.expected_durations(task.epsilon()))),
                 Some(world.around_expected_durations()),
             ),
             beliefs => (task, beliefs),
