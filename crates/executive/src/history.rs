@@ -68,7 +68,6 @@ pub(crate) fn page(
     before: Option<&Rational>,
     limit: usize,
 ) -> HistoryNow {
-    let limit = limit.clamp(1, MAX_PAGE);
     let mut page = HistoryNow {
         goals: Vec::new(),
         actions: Vec::new(),

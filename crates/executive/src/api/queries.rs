@@ -5,7 +5,7 @@ use std::sync::TryLockError;
 use elbowroom::num::Rational;
 
 use super::router::{ApiError, ApiRouter};
-use crate::history::page;
+use crate::history::{MAX_PAGE, page};
 use crate::interface::documents::{Activity, HistoryNow, State};
 
 /// Number of entries of a page, if the client does not give one.
@@ -52,8 +52,10 @@ impl ApiRouter {
                     before = Some(time.map_err(|_| wrong("a time in `before`"))?);
                 }
                 Some(("limit", number)) => {
-                    let number = number.parse::<usize>().ok().filter(|it| *it > 0);
-                    limit = number.ok_or_else(|| wrong("a positive number in `limit`"))?;
+                    let number = number.parse::<usize>().ok();
+                    let number = number.filter(|it| (1..=MAX_PAGE).contains(it));
+                    let expected = format!("a number from 1 to {MAX_PAGE} in `limit`");
+                    limit = number.ok_or_else(|| wrong(&expected))?;
                 }
                 _ => return Err(wrong("`before` or `limit`")),
             }

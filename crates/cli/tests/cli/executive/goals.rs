@@ -270,7 +270,7 @@ fn assert_history(own: &Executive, more: usize) {
         text.contains("more-0: achieved") && text.contains("(do "),
         "{text}"
     );
-    for wrong in ["limit=0", "before=soon", "after=1"] {
+    for wrong in ["limit=0", "limit=1001", "before=soon", "after=1"] {
         assert_eq!(own.get(&format!("/v1/history?{wrong}")).0, 422);
     }
 }
