@@ -55,9 +55,10 @@ mod windows;
 use std::ops::ControlFlow;
 use std::sync::OnceLock;
 
+use elbowroom_model::ground::Change;
 use elbowroom_model::reachability::{self, Grounding};
 use elbowroom_model::{Situation, Task};
-use elbowroom_num::work;
+use elbowroom_num::{Rational, work};
 
 pub use answer::{Answer, Counts, FoundPlan, Objective, Phase, Progress, Proof, Settings, Stopped};
 pub use compile::Unsupported;
@@ -113,7 +114,63 @@ pub fn plan(
 
 /// As [`plan`], for a task without trajectory constraints. `constrained` is the
 /// same task with constraints, and its situation; plans that violate them are not accepted.
+///
+/// If timed initials change fluents that the metric may read, a first plan is found without the
+/// metric: fluents that only conditions read are [calendars](compile::calendars).
 fn search_for_plans(
+    task: &Task,
+    constrained: Option<(&Task, &Situation)>,
+    situation: &Situation,
+    settings: &Settings,
+    observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+) -> Answer {
+    let mut changes = task.timed().iter().flat_map(|timed| &timed.changes);
+    let has_timed_fluents = changes.any(|change| matches!(change, Change::Update { .. }));
+    let is_metric = !settings.first_plan_only
+        && settings.objective == Objective::Metric
+        && task.problem().metric.is_some();
+    if !has_timed_fluents || !is_metric {
+        return search_once(task, constrained, situation, settings, observe);
+    }
+    let first_only = Settings {
+        first_plan_only: true,
+        ..settings.clone()
+    };
+    let first = search_once(task, constrained, situation, &first_only, observe);
+    let (found, counts) = match first {
+        Answer::Plan {
+            found,
+            stopped: Stopped::FirstPlan,
+            counts,
+        } => (found, counts),
+        answer => return answer,
+    };
+    let is_better = |value: &Rational| *value < found.value;
+    let mut report = |progress: &Progress| {
+        let mut progress = progress.clone();
+        progress.counts = progress.counts.after(&counts);
+        if !progress.best.as_ref().is_some_and(is_better) {
+            progress.plan = None;
+            progress.best = Some(found.value.clone());
+        }
+        observe(&progress)
+    };
+    let answer = search_once(task, constrained, situation, settings, &mut report);
+    let more = answer.counts().copied().unwrap_or_default();
+    let stopped = match &answer {
+        Answer::Plan { stopped, .. } | Answer::NoneFound { stopped, .. } => *stopped,
+        Answer::Unsolvable { .. } | Answer::Unsupported(_) => Stopped::Exhausted,
+    };
+    let other = answer.found().filter(|other| is_better(&other.value));
+    Answer::Plan {
+        found: other.unwrap_or(&found).clone(),
+        stopped,
+        counts: more.after(&counts),
+    }
+}
+
+/// As [`search_for_plans`], with one compiled form of the task.
+fn search_once(
     task: &Task,
     constrained: Option<(&Task, &Situation)>,
     situation: &Situation,

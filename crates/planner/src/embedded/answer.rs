@@ -106,6 +106,17 @@ pub struct Counts {
     pub memory: usize,
 }
 
+impl Counts {
+    /// Returns the counts of a search after an earlier one, together with those of the earlier one.
+    pub(super) fn after(mut self, earlier: &Self) -> Self {
+        self.expanded += earlier.expanded;
+        self.generated += earlier.generated;
+        self.evaluated += earlier.evaluated;
+        self.work += earlier.work;
+        self
+    }
+}
+
 /// A valid plan and its values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FoundPlan {

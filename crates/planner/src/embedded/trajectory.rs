@@ -322,11 +322,7 @@ impl Search<'_> {
         let best = &self.best;
         let better =
             found.filter(|found| best.as_ref().is_none_or(|best| worth(found) < worth(best)));
-        let mut counts = progress.counts;
-        counts.expanded += self.spent.expanded;
-        counts.generated += self.spent.generated;
-        counts.evaluated += self.spent.evaluated;
-        counts.work += self.spent.work;
+        let counts = progress.counts.after(&self.spent);
         let report = Progress {
             counts,
             plan: better.clone(),
