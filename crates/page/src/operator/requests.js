@@ -23,8 +23,12 @@ function confirmed(title, text, verb) {
   dialog.returnValue = "";
   dialog.showModal();
   byId("no").focus();
-  return new Promise((done) => dialog.addEventListener("close", () => done(dialog.returnValue === "yes"), { once: true }));
+  answerQuestion(false);
+  return new Promise((done) => { answerQuestion = done; });
 }
+// The event `close` is sent some time after the dialog is closed, and may arrive when the next question is already open.
+let answerQuestion = () => {};
+byId("question").addEventListener("close", (event) => { if (!event.target.open) answerQuestion(event.target.returnValue === "yes"); });
 byId("no").addEventListener("click", () => byId("question").close("no"));
 byId("yes").addEventListener("click", () => byId("question").close("yes"));
 
