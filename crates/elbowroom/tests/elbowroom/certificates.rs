@@ -519,7 +519,7 @@ fn certificates_of_published_plans_are_accepted() {
         let (mut accepted, mut assuming, mut without) = (0, 0, 0);
         let (mut longest, mut largest) = (0.0_f64, 0);
         let mut conditions = 0;
-        for instance in &instances {
+        for instance in instances.iter().step_by(shared::one_in(4)) {
             for guarantee in GUARANTEES {
                 for objective in OBJECTIVES {
                     match of_published(instance, guarantee, objective) {

@@ -287,9 +287,11 @@ fn own_plans_stay_valid_when_deordered() {
 #[test]
 fn benchmark_plans_stay_valid_when_deordered() {
     let Some(data) = shared::data() else { return };
-    let count = examine_all(&valid_plans(&data));
-    assert!(count.plans >= 110, "{}", count.plans);
-    assert!(count.made_ready >= 20, "{}", count.made_ready);
+    let n: usize = shared::one_in(3);
+    let plans: Vec<_> = valid_plans(&data).into_iter().step_by(n).collect();
+    let count = examine_all(&plans);
+    assert!(count.plans * n >= 110, "{}", count.plans);
+    assert!(count.made_ready * n >= 20, "{}", count.made_ready);
 }
 
 #[test]

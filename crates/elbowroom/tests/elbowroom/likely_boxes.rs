@@ -260,7 +260,7 @@ fn certificates_of_published_plans_are_accepted() {
     ] {
         let (mut proved, mut unproved, mut without) = (0, 0, 0);
         let (mut search, mut check) = (0.0_f64, 0.0_f64);
-        for instance in &instances {
+        for instance in instances.iter().step_by(shared::one_in(4)) {
             let case = Case::read(&instance.domain, &instance.problem, &instance.plan);
             let plan = ParametrizedPlan::clone(&case.plan);
             let mut request = request(&case.task, plan, AROUND);

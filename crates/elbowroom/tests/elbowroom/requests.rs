@@ -236,14 +236,14 @@ fn plan_of_a_case_is_requested_once_and_not_rejected() {
         }
     }
     println!("{count} requests");
-    assert!(count > 100, "{count}");
+    assert!(count > 50, "{count}");
 }
 
 #[test]
 fn plan_of_a_random_problem_is_requested_once_and_not_rejected() {
     let mut count = 0;
     // In the seeds after the first ones, conditional effects depend on numbers.
-    for seed in (0..500).chain([1590]) {
+    for seed in (0..500 / shared::one_in::<u64>(2)).chain([1590]) {
         let problem = solvable::problem(seed).expect("a problem");
         let task = Arc::new(problem.task());
         if task.validator_only_feature().is_some() || task.unsupported_by_analysis().is_some() {

@@ -8,6 +8,8 @@ mod found_bugs;
 mod given;
 mod irr;
 mod oracle;
+#[path = "../../../../testing/sampled.rs"]
+mod sampled;
 mod second_oracle;
 #[path = "../../../../testing/skipped.rs"]
 mod skipped;

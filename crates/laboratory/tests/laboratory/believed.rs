@@ -119,7 +119,7 @@ fn world_learnt_from_few_logs_is_as_good_as_the_true_one() {
     let names: &[&str] = if times.is_some() {
         &["weld", "detour", "rendezvous", "door"]
     } else {
-        &["detour", "rendezvous"]
+        &["rendezvous"]
     };
     let trials = if times.is_some() { 2000 } else { 1000 };
     let times = times.unwrap_or(4);

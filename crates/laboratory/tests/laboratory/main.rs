@@ -8,6 +8,8 @@ mod perturbed;
 mod policy;
 mod rehearsal;
 mod same_orders;
+#[path = "../../../../testing/sampled.rs"]
+mod sampled;
 mod shared;
 #[path = "../../../../testing/skipped.rs"]
 mod skipped;

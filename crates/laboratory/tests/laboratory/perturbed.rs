@@ -2,6 +2,9 @@
 //!
 //! `ELBOWROOM_UNTIMED_TRIALS=3000` sets the number of trials of the tests that compare shares.
 
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+
 use elbowroom_laboratory::perturbed::{
     self, OptimumRules, PerturbedExperiment, PlannerKind, Row, StoredTrial, UntimedCounts,
     WorldKind,
@@ -35,7 +38,15 @@ fn deviation(probability: f64) -> f64 {
     (probability * (1.0 - probability) / f64::from(trials())).sqrt()
 }
 
+/// Returns the results of an experiment. They are computed once for all tests.
 fn rows(name: &str, world: WorldKind) -> Vec<Row> {
+    static KNOWN: Mutex<BTreeMap<(String, String), Vec<Row>>> = Mutex::new(BTreeMap::new());
+    let mut known = KNOWN.lock().unwrap();
+    let rows = known.entry((name.to_owned(), format!("{world:?}")));
+    rows.or_insert_with(|| computed_rows(name, world)).clone()
+}
+
+fn computed_rows(name: &str, world: WorldKind) -> Vec<Row> {
     let mut experiment = experiment(name);
     experiment.worlds = vec![world];
     perturbed::run(&experiment, Part::whole(trials().into(), 0), &|_| true)

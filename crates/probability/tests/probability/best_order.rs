@@ -143,7 +143,8 @@ const EASY: Taste = Taste {
 fn found_order_is_optimal() {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let (mut long, mut hasty) = (0, 0);
-    for round in 0..700 {
+    let rounds = 700 / shared::one_in::<usize>(2);
+    for round in 0..rounds {
         let taste = Taste {
             couples: round % 4 == 0,
             timed: round % 3 == 0,
@@ -171,8 +172,14 @@ fn found_order_is_optimal() {
         case.circumstances.running = running;
         compare(&case, settings);
     }
-    assert!(long > 250, "{long} orders had more than one happening");
-    assert!(hasty > 100, "{hasty} orders were there from the beginning");
+    assert!(
+        3 * long > rounds,
+        "{long} orders had more than one happening"
+    );
+    assert!(
+        7 * hasty > rounds,
+        "{hasty} orders were there from the beginning"
+    );
 }
 
 /// Generates actions that make each other's conditions true, most of them at their start.

@@ -19,6 +19,7 @@ use elbowroom::verify::Exact;
 use elbowroom::verify::no_plan::{ClosedState, Kind, NoPlan, verify_no_plan_from};
 
 use crate::game::Random;
+use crate::shared;
 
 const OBJECTS: [&str; 3] = ["a", "b", "c"];
 
@@ -317,7 +318,8 @@ fn certificates_in_mid_execution_are_sound() {
     let mut random = Random(5);
     let (mut kinds, mut reasons) = (BTreeMap::<(Kind, bool), usize>::new(), BTreeMap::new());
     let (mut solved, mut refused, mut forgeries) = (0, 0, 0);
-    for number in 0..PROBLEMS {
+    let n = shared::one_in::<usize>(3);
+    for number in 0..PROBLEMS / n {
         let amid = draw(&mut random);
         let task = &amid.task;
         for from in [with_any_ends(&amid.situation), amid.situation.clone()] {
@@ -368,5 +370,5 @@ fn certificates_in_mid_execution_are_sound() {
             .all(|kind| of(kind) > 0),
         "{kinds:?}"
     );
-    assert!(solved > 50 && forgeries > 100);
+    assert!(solved * n > 50 && forgeries * n > 100);
 }

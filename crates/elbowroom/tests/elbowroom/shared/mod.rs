@@ -10,6 +10,8 @@ pub(crate) mod instances;
 pub(crate) mod own;
 pub(crate) mod rounds;
 
+#[path = "../../../../../testing/sampled.rs"]
+mod sampled;
 #[path = "../../../../../testing/skipped.rs"]
 mod skipped;
 
@@ -17,6 +19,7 @@ use std::path::{Path, PathBuf};
 
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_pddl::{Source, read_plan, read_problem};
+pub(crate) use sampled::one_in;
 pub(crate) use skipped::skipped;
 
 /// Returns the folder of benchmark data, if it exists.

@@ -16,6 +16,7 @@ use elbowroom_num::Rational;
 use elbowroom_pddl::{Source, read_problem};
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, ParametrizedPlan, Side, format};
 
+use crate::sampled::one_in;
 use crate::second_oracle::instances::{Instance, figure_3, figure_4};
 use crate::second_oracle::setting;
 use crate::second_oracle::smt::contained;
@@ -40,7 +41,8 @@ fn boxes_are_inside_and_maximal_by_published_encoding() {
     let epsilon = Rational::new(1, 1000);
     let mut tally = Tally::default();
     let wanted = std::env::var("ELBOWROOM_INSTANCES").unwrap_or_default();
-    for instance in figure_3(&data).into_iter().chain(figure_4(&data)) {
+    let instances = figure_3(&data).into_iter().chain(figure_4(&data));
+    for instance in instances.step_by(one_in(3)) {
         if !instance.name.starts_with(&wanted) {
             continue;
         }
@@ -99,7 +101,7 @@ fn boxes_are_inside_and_maximal_by_published_encoding() {
     println!("{tally:?}");
     let is_whole = wanted.is_empty();
     assert!(
-        !is_whole || (tally.inside >= 10 && tally.outside >= 15),
+        !is_whole || (tally.inside >= 5 && tally.outside >= 5),
         "{tally:?}"
     );
 }

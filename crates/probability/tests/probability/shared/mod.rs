@@ -2,6 +2,8 @@
 //! files outside of the repository report if these are missing, and pass.
 #![allow(dead_code, reason = "each test uses some of it")]
 
+#[path = "../../../../../testing/sampled.rs"]
+mod sampled;
 #[path = "../../../../../testing/skipped.rs"]
 mod skipped;
 
@@ -14,6 +16,7 @@ use elbowroom_plan::PartialOrderPlan;
 use elbowroom_plan::partial_order::partial_order;
 use elbowroom_probability::likelihoods::read_authors;
 use elbowroom_probability::{Likelihoods, Model, Semantics};
+pub(crate) use sampled::one_in;
 pub(crate) use skipped::skipped;
 
 /// The plan that POPF gave the authors for SF3: all at once.
