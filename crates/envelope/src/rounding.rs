@@ -33,7 +33,7 @@ const LARGEST_UNIT: (i64, i64) = (1, 1000);
 /// Limit on the steps of plans whose numeric conditions are met by linear programs.
 const MAX_STEPS: usize = 200;
 /// Limit on the linear programs solved for one plan.
-const MAX_PROGRAMS: usize = 60;
+pub(crate) const MAX_PROGRAMS: usize = 60;
 
 /// The rule about rounded plans, with its settings.
 #[derive(Clone, Debug, Default)]
@@ -85,6 +85,11 @@ impl RoundingRule {
     /// Returns the valid plan within rounding of the printed numbers. Returns the printed plan itself if
     /// it is valid, or if there is no such plan.
     pub fn accept(&self, task: &Task, printed: &PrintedPlan) -> Accepted {
+        self.accept_within(task, printed, MAX_PROGRAMS)
+    }
+
+    /// As [`accept`](Self::accept), with a limit on the linear programs.
+    fn accept_within(&self, task: &Task, printed: &PrintedPlan, programs: usize) -> Accepted {
         let windows = self.windows(printed);
         let as_printed = Accepted {
             plan: printed.plan.clone(),
@@ -96,7 +101,7 @@ impl RoundingRule {
         let Verdict::Invalid(violation) = self.verdict(task, &printed.plan) else {
             return as_printed;
         };
-        match self.valid_plan_within(task, &printed.plan, &windows) {
+        match self.valid_plan_within(task, &printed.plan, (&windows, programs)) {
             Some(plan) => Accepted {
                 plan,
                 rounded: Some(Box::new(violation)),
@@ -105,9 +110,10 @@ impl RoundingRule {
         }
     }
 
-    /// Returns `true` if the printed plan is valid, exactly or within rounding.
-    pub(crate) fn is_valid(&self, task: &Task, printed: &PrintedPlan) -> bool {
-        let accepted = self.accept(task, printed);
+    /// Returns `true` if the printed plan is valid, exactly or within rounding, and at most
+    /// `programs` linear programs are needed to find that. [`accept`](Self::accept) then accepts it.
+    pub(crate) fn is_valid(&self, task: &Task, printed: &PrintedPlan, programs: usize) -> bool {
+        let accepted = self.accept_within(task, printed, programs);
         accepted.rounded.is_some() || self.verdict(task, &accepted.plan).is_valid()
     }
 
@@ -148,7 +154,7 @@ impl RoundingRule {
         &self,
         task: &Task,
         printed: &TimeTriggeredPlan,
-        windows: &[StepWindow],
+        (windows, programs): (&[StepWindow], usize),
     ) -> Option<TimeTriggeredPlan> {
         let mut plan = with_allowed_durations(task, printed, windows);
         match self.verdict_with_durations(task, &mut plan, windows) {
@@ -167,8 +173,9 @@ impl RoundingRule {
             let earlier = &orders[..*index];
             !earlier.contains(order)
         });
-        let found = distinct
-            .find_map(|(_, order)| self.valid_plan_in_order(task, order, &plan, windows))?;
+        let found = distinct.find_map(|(_, order)| {
+            self.valid_plan_in_order(task, order, &plan, (windows, programs))
+        })?;
         Some(found.in_order())
     }
 
@@ -179,14 +186,14 @@ impl RoundingRule {
         task: &Task,
         order: &TimeTriggeredPlan,
         plan: &TimeTriggeredPlan,
-        windows: &[StepWindow],
+        (windows, programs): (&[StepWindow], usize),
     ) -> Option<TimeTriggeredPlan> {
         // No plan results if interfering happenings have no order.
         let refitted = fit_times_to_windows(task, order, plan, windows)?;
         match self.verdict(task, &refitted) {
             Verdict::Valid(_) => Some(refitted),
             Verdict::Invalid(violation) if is_about_numbers(&violation) => {
-                self.by_linear_programs(task, order, windows)
+                self.by_linear_programs(task, order, (windows, programs))
             }
             Verdict::Invalid(_) | Verdict::Undecided(_) => None,
         }
@@ -222,7 +229,7 @@ impl RoundingRule {
         &self,
         task: &Task,
         plan: &TimeTriggeredPlan,
-        windows: &[StepWindow],
+        (windows, programs): (&[StepWindow], usize),
     ) -> Option<TimeTriggeredPlan> {
         if task.unsupported_by_analysis().is_some() || plan.steps.len() > MAX_STEPS {
             return None;
@@ -232,7 +239,7 @@ impl RoundingRule {
         let closed = ParametrizedPlan::closed(task, free.plan);
         let at = |schedule: &Schedule| with_times(plan, &closed.plan, &free.instances, schedule);
         let limits = RepairLimits {
-            cases: MAX_PROGRAMS,
+            cases: programs,
             ..RepairLimits::default()
         };
         let run = repair(

@@ -1,5 +1,6 @@
 //! Happenings that keep their order, and happenings that may change it.
 
+use std::cell::OnceCell;
 use std::collections::BTreeSet;
 
 use elbowroom_model::ground::{Body, Effect, FactId, FluentId};
@@ -20,6 +21,9 @@ pub(super) struct Orders {
     /// `true` if effects have conditions, so that the changes of one happening can depend on all
     /// others.
     pub(super) is_conditional: bool,
+    /// Pairs of interfering happenings without a fixed order, the smaller number first. Computed
+    /// when first needed.
+    open_pairs: OnceCell<BTreeSet<(NodeId, NodeId)>>,
 }
 
 impl Orders {
@@ -82,6 +86,7 @@ impl Orders {
                     }
                 }
             }),
+            open_pairs: OnceCell::new(),
         }
     }
 
@@ -129,11 +134,23 @@ impl Orders {
             .into_iter()
             .chain(of(&writers))
             .chain(of(readers));
-        let mut pairs = pairs.filter(|&(one, other)| {
-            let footprint = |node: NodeId| &self.footprints[node.index()];
-            self.is_open(one, other) && footprint(one).interferes_with(footprint(other))
-        });
+        let open = self.open_pairs();
+        let mut pairs = pairs.filter(|pair| open.contains(pair));
         pairs.find(|pair| !decided.contains(pair))
+    }
+
+    fn open_pairs(&self) -> &BTreeSet<(NodeId, NodeId)> {
+        self.open_pairs.get_or_init(|| {
+            let nodes = || (0..self.footprints.len()).map(NodeId::from);
+            let pairs =
+                nodes().flat_map(|one| nodes().take(one.index()).map(move |other| (other, one)));
+            let footprint = |node: NodeId| &self.footprints[node.index()];
+            pairs
+                .filter(|&(one, other)| {
+                    self.is_open(one, other) && footprint(one).interferes_with(footprint(other))
+                })
+                .collect()
+        })
     }
 
     /// Returns the two as a pair, if their order can still be decided.

@@ -323,7 +323,10 @@ impl<'a> Stepper<'a> {
             } else {
                 duration_form(open.duration.as_ref(), open.node, node)
             };
-            (symbolic::end_form(&open, node), Some(duration))
+            (
+                symbolic::end_form(self.compiled, &open, node),
+                Some(duration),
+            )
         });
         self.demand(state, &snap.condition, open.duration.as_ref(), &moment)?;
         if state.symbolic.is_some() {

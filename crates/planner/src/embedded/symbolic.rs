@@ -254,7 +254,7 @@ pub(crate) fn settled_value(compiled: &Compiled, state: &State, fluent: u32) -> 
             return None;
         }
     }
-    match settled_function(symbolic, state, fluent) {
+    match settled_function(compiled, symbolic, state, fluent) {
         None => state.values[fluent as usize].clone(),
         Some(course) => {
             let is_settled = course.rate.is_zero();
@@ -271,11 +271,16 @@ fn is_assigned_later(compiled: &Compiled, state: &State, fluent: u32) -> bool {
 
 /// Returns the course of a fluent after the ends of all running actions, without its jumps at these
 /// ends, or `None` if its value does not depend on times.
-fn settled_function(symbolic: &Symbolic, state: &State, fluent: u32) -> Option<LinearFunction> {
+fn settled_function(
+    compiled: &Compiled,
+    symbolic: &Symbolic,
+    state: &State,
+    fluent: u32,
+) -> Option<LinearFunction> {
     let mut course = symbolic.linear_function(fluent)?.clone();
     for open in &state.open {
         for (_, rate) in open.flows.iter().filter(|(own, _)| *own == fluent) {
-            let time = end_form(open, open.end);
+            let time = end_form(compiled, open, open.end);
             course.base = std::mem::take(&mut course.base).plus(rate, &time);
             course.rate -= rate;
         }
@@ -285,13 +290,19 @@ fn settled_function(symbolic: &Symbolic, state: &State, fluent: u32) -> Option<L
 
 /// Returns the time of an action's end. A fixed duration counts from the start, so that the total
 /// of a continuous change is a constant.
-pub(crate) fn end_form(open: &OpenAction, end: NodeId) -> Form {
-    match &open.duration {
-        Some(duration) if open.node != SETTLED => {
-            Form::constant(duration.clone()).plus(&Rational::ONE, &Form::node(open.node))
-        }
-        _ => Form::node(end),
+pub(crate) fn end_form(compiled: &Compiled, open: &OpenAction, end: NodeId) -> Form {
+    let Some(duration) = &open.duration else {
+        return Form::node(end);
+    };
+    if open.node != SETTLED {
+        return Form::constant(duration.clone()).plus(&Rational::ONE, &Form::node(open.node));
     }
+    let initial = &compiled.initial;
+    let running = initial.running.get(open.action as usize);
+    let known = running.map(|running| &running.exact_start + duration);
+    known
+        .filter(|known| *known >= initial.time)
+        .map_or_else(|| Form::node(end), Form::constant)
 }
 
 fn function_of(state: &State, fluent: u32) -> Option<LinearFunction> {

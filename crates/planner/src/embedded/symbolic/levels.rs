@@ -24,7 +24,7 @@ pub(crate) fn highest_level(compiled: &Compiled, state: &State, fluent: u32) -> 
     if is_assigned_later(compiled, state, fluent) {
         return None;
     }
-    let course = settled_function(symbolic, state, fluent)?;
+    let course = settled_function(compiled, symbolic, state, fluent)?;
     if !course.rate.is_zero() {
         return None;
     }

@@ -3,6 +3,7 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use elbowroom_model::problem::ObjectId;
 use elbowroom_model::{RunningAction, Situation, Task};
 use elbowroom_num::{Interval, Rational};
 use elbowroom_planner::{Answer, Settings, Stopped, plan};
@@ -229,6 +230,95 @@ fn overdue_action_changes_numbers_more() {
     assert!(
         !matches!(answer, Answer::Unsolvable { .. }),
         "{}",
+        describe(&answer)
+    );
+}
+
+const WATERING: &str = "
+    (:requirements :typing :durative-actions :numeric-fluents :timed-initial-literals
+      :duration-inequalities)
+    (:types tank bed)
+    (:predicates (ready ?t - tank) (home ?t - tank) (at ?t - tank ?b - bed) (wet ?b - bed)
+      (open ?b - bed))
+    (:functions (level ?t - tank) (need ?b - bed))
+    (:durative-action go :parameters (?t - tank ?b - bed) :duration (= ?duration 3)
+      :condition (and (at start (home ?t)) (at start (ready ?t)))
+      :effect (and (at start (not (home ?t))) (at end (at ?t ?b))))
+    (:durative-action return :parameters (?t - tank ?b - bed) :duration (= ?duration 3)
+      :condition (and (at start (at ?t ?b)) (at start (ready ?t)))
+      :effect (and (at start (not (at ?t ?b))) (at end (home ?t))))
+    (:durative-action water :parameters (?t - tank ?b - bed) :duration (= ?duration (/ (need ?b) 2))
+      :condition (and (at start (ready ?t)) (over all (at ?t ?b)) (over all (open ?b))
+        (at start (>= (level ?t) (need ?b))))
+      :effect (and (at start (not (ready ?t))) (at end (ready ?t)) (at end (wet ?b))
+        (decrease (level ?t) (* #t 2))))
+    (:durative-action fill :parameters (?t - tank)
+      :duration (and (>= ?duration 1) (<= ?duration 30))
+      :condition (and (over all (home ?t)) (at start (ready ?t)) (over all (<= (level ?t) 60)))
+      :effect (and (at start (not (ready ?t))) (at end (ready ?t))
+        (increase (level ?t) (* #t 4))))";
+
+/// A running continuous change of known duration is as easy as one that has ended.
+#[test]
+fn replanning_during_a_known_drain_needs_few_states() {
+    let beds = 0..10;
+    let names: String = beds.clone().map(|bed| format!("b{bed} ")).collect();
+    let goals: String = beds.clone().map(|bed| format!("(wet b{bed})")).collect();
+    let of_beds: String = beds
+        .map(|bed| {
+            let (need, opens) = (12 + bed * 5 % 12, 1 + bed * 12);
+            let [closes, again, last] = [20, 45, 65].map(|time| opens + time);
+            format!(
+                "(= (need b{bed}) {need}) (at {opens} (open b{bed})) (at {closes} (not (open b{bed})))
+                 (at {again} (open b{bed})) (at {last} (not (open b{bed})))"
+            )
+        })
+        .collect();
+    let problem = format!(
+        "(:objects t1 t2 - tank {names} - bed)
+         (:init (home t1) (home t2) (ready t1) (ready t2) (= (level t1) 30) (= (level t2) 30) {of_beds})
+         (:goal (and {goals}))"
+    );
+    let task = task(WATERING, &problem);
+    let object = |name| task.problem().object(name).expect("as written");
+    let (tank, bed) = (object("t1"), object("b0"));
+    let fact = |name, arguments: &[ObjectId]| {
+        let predicate = task.problem().predicate(name).expect("as written");
+        task.find_fact(predicate, arguments).expect("as written")
+    };
+    let schema = task.problem().schema("water").expect("as written");
+    let action = task.instantiate(schema, &[tank, bed]).expect("as written");
+    let level = task.problem().function("level").expect("as written");
+    let level = task.find_fluent(level, &[tank]).expect("as written");
+    let mut situation = Situation::initial(&task);
+    for gone in ["home", "ready"] {
+        situation.state.facts.remove(&fact(gone, &[tank]));
+    }
+    situation.state.facts.insert(fact("at", &[tank, bed]));
+    situation.state.facts.insert(fact("open", &[bed]));
+    situation.state.values.insert(level, 26.into());
+    situation.time = 5.into();
+    situation.running.push(RunningAction {
+        action: Arc::new(action),
+        start: 3.into(),
+        duration: Interval::point(6.into()),
+    });
+    let settings = Settings {
+        first_plan_only: true,
+        ..Settings::default()
+    };
+    let mut states = 0;
+    let answer = plan(&task, &situation, &settings, &mut |progress| {
+        states = progress.counts.evaluated;
+        if states < 300 {
+            ControlFlow::Continue(())
+        } else {
+            ControlFlow::Break(())
+        }
+    });
+    assert!(
+        answer.found().is_some(),
+        "after {states} states: {}",
         describe(&answer)
     );
 }
