@@ -64,7 +64,7 @@ pub use preparation::{
     PreparationRequest, PreparationResult, PrepareError, Preparer, RegionOracle,
 };
 pub use reason::{Cause, Evidence, GuaranteeLevel, Reason, Subject, TimedChange};
-pub use record::{Entry, GoalChange, NoRecord, Recorder, WarningCause};
+pub use record::{Entry, GoalChange, NoRecord, Recorder, UnreachedGoal, WarningCause};
 pub use request::{Answer, PlanRequest, PortWorkers, PrepareRequest, RequestId, Urgency, Workers};
 pub use rollout::{
     DecisionPoint, Informativeness, ObservedChange, RolloutChoice, RolloutEvaluator, RolloutResult,

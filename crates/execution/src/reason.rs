@@ -94,6 +94,7 @@ terms! {
         NotTogether = "not-together":
             "each part of the goal could still become true, but not all of them",
         TooLate = "too-late": "a goal would be reached after its deadline",
+        NoPlan = "no-plan": "no plan reaches a goal, or none was found",
     }
 }
 
@@ -210,7 +211,7 @@ impl Reason {
                 None => format!("{about} could never become true"),
             },
             Cause::NotTogether if known.is_some() => format!("{about} exclude each other"),
-            Cause::TooLate => about.to_owned(),
+            Cause::TooLate | Cause::NoPlan => about.to_owned(),
             Cause::NotTogether => {
                 "each part of the goal is reachable if deletions and deadlines are ignored, but no \
                  plan reaches all of them"

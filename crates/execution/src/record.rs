@@ -81,6 +81,17 @@ impl Recorder for NoRecord {
     fn record(&mut self, _entry: &Entry<'_>) {}
 }
 
+/// A goal without a plan.
+#[derive(Clone, Debug, PartialEq)]
+pub struct UnreachedGoal {
+    /// Its name.
+    pub name: String,
+    /// `true` if no plan reaches it, even without the other goals, as a certificate proves.
+    pub is_impossible: bool,
+    /// The reasons about this goal.
+    pub reasons: Vec<Reason>,
+}
+
 /// One entry of a run's record. All times are on the world's clock unless stated otherwise.
 #[derive(Clone, Copy, Debug)]
 pub enum Entry<'a> {
@@ -203,6 +214,8 @@ pub enum Entry<'a> {
         goals: &'a [String],
         /// The parts of the goal that can never become true again, as in [`Report::dead_end`].
         dead_end: &'a [Reason],
+        /// The open goals without a plan, each with the reasons about it.
+        unreached: &'a [UnreachedGoal],
     },
     /// The end of the run was requested.
     Interrupted {

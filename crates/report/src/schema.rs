@@ -410,6 +410,21 @@ pub struct IdleLine {
     pub goals: Vec<String>,
     /// Conditions that can never become true again.
     pub dead_end: Vec<ReasonLine>,
+    /// The open goals without a plan; traces of earlier versions do not have them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unreached: Option<Vec<UnreachedLine>>,
+}
+
+/// A goal without a plan.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct UnreachedLine {
+    /// Its name.
+    pub name: String,
+    /// `true` if a certificate proves that no plan reaches it.
+    pub impossible: bool,
+    /// The reasons about this goal.
+    pub reasons: Vec<ReasonLine>,
 }
 
 /// Request to end the run.

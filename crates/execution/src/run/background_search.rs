@@ -291,6 +291,7 @@ impl Run<'_> {
             return Ok(());
         };
         let took = &self.now - &search.query().started_at;
+        let expected = self.background.expected_time().clone();
         self.background.update_expected_time(&took);
         self.ports.recorder.record(&Entry::Planned {
             now: &self.now,
@@ -302,12 +303,43 @@ impl Run<'_> {
             remark: remark.as_deref(),
             shortfall: &shortfall,
         });
-        self.goals.note_shortfall(&search.query().goals, &shortfall);
         self.check_stop_request()?;
+        if answer.plan().is_none() && self.search_from_earlier_start(&search, &took, &expected) {
+            return Ok(());
+        }
+        self.goals.note_shortfall(&search.query().goals, &shortfall);
         match answer {
             PlanAnswer::Plan(plan) => self.process_found_plan(search, &plan),
             answer => self.process_failed_search(&search, &answer),
         }
+    }
+
+    /// Searches again after a failed search that took less than half of the expected time, if a
+    /// plan that begins earlier may reach goals in time. Returns `false` if there is no reason to.
+    fn search_from_earlier_start(
+        &mut self,
+        search: &BackgroundSearch,
+        took: &Rational,
+        expected: &Rational,
+    ) -> bool {
+        let query = search.query();
+        let is_timed =
+            query.task.deadlines().next().is_some() || self.belief.next_timed().is_some();
+        let is_needed =
+            !search.is_optional() && !search.is_outdated() && !self.goals.is_change_pending();
+        // It may take twice as long as the last search.
+        let next = took * &Rational::from(2);
+        if !is_timed || !is_needed || !expected.is_positive() || &next + &next > *expected {
+            return false;
+        }
+        self.background.set_expected_time(next);
+        let reason = query.reason.clone();
+        if search.has_abandoned_plan() {
+            self.search_without_plan(reason, query.guess);
+        } else {
+            self.search_beside_plan(reason, None);
+        }
+        true
     }
 
     fn process_failed_search(

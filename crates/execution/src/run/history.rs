@@ -95,33 +95,23 @@ impl History {
         }
     }
 
-    /// Returns the parts of the goal that can never become true again, and since when. Without such
-    /// a part, names the goals that exclude each other (`conflict`).
-    pub(super) fn dead_end(
+    /// Returns the first parts of the goal that can never become true again, and since when. `None`
+    /// if they cannot be computed within the limit.
+    pub(super) fn explain_unreachable_parts(
         &self,
         belief: &BeliefState,
         log: &ActionLog,
         now: &Rational,
-        conflict: Option<String>,
-    ) -> Vec<Reason> {
+    ) -> Option<Vec<(Condition, Reason)>> {
         let mut past = self.replay(belief, log, now);
         let mut present = past.belief_after(self.events.len());
         let _ = present.advance(now);
-        let Some(lost) = unreachable(&present, MAX_STEPS) else {
-            return Vec::new();
-        };
-        if lost.is_empty() {
-            let reason = Reason::new(Cause::NotTogether);
-            return vec![match conflict {
-                Some(conflict) => reason.about(Subject::ExternalMessage(conflict)),
-                None => reason,
-            }];
-        }
-        let explained = lost
-            .iter()
-            .take(MAX_EXPLAINED_PARTS)
-            .map(|goal| past.explain(goal));
-        explained.collect()
+        let lost = unreachable(&present, MAX_STEPS)?;
+        let explained = lost.into_iter().take(MAX_EXPLAINED_PARTS).map(|part| {
+            let reason = past.explain(&part);
+            (part, reason)
+        });
+        Some(explained.collect())
     }
 
     fn replay<'h>(

@@ -40,7 +40,7 @@ use super::{Run, Stop};
 use crate::event::{ActionHandle, Request};
 use crate::executor::PlanEvent;
 use crate::reason::{Cause, Reason, Subject};
-use crate::record::Entry;
+use crate::record::{Entry, UnreachedGoal};
 
 /// Time after an unsuccessful search during which no other one begins, whatever is reported, in
 /// seconds of the world's clock.
@@ -131,7 +131,7 @@ impl Run<'_> {
         if self.goals.is_empty() {
             self.drop_plan();
             if !self.goals.note_goal_abandoned() {
-                self.become_idle_because(None, &[]);
+                self.become_idle_because(None, &[], &[]);
             }
             return Ok(());
         }
@@ -200,14 +200,29 @@ impl Run<'_> {
         self.with_goals(super::goals::GoalManager::announce_goals);
         let mut reasons = self.goals.missed_deadlines();
         let is_explained = reasons.len() == self.goals.pursued_goals();
-        if *verdict == Verdict::Unsolvable && self.history.is_explaining() && !is_explained {
-            reasons.extend(self.dead_end());
+        let explains = self.history.is_explaining() && !is_explained;
+        let is_unsolvable = *verdict == Verdict::Unsolvable;
+        let is_certain = is_unsolvable || self.goals.is_any_unreachable();
+        let parts = (explains && is_certain).then(|| self.unreachable_parts());
+        let parts = parts.flatten();
+        let known = parts.as_deref().unwrap_or_default();
+        let unreached = self.goals.unreached(&self.task, verdict, known);
+        if is_unsolvable && explains {
+            reasons.extend(self.dead_end(parts));
         }
         self.drop_plan();
-        self.become_idle_because(Some(verdict), &reasons);
+        // The last search need not have been that for a goal that may have a plan.
+        let undecided = self.goals.undecided_verdict(&unreached);
+        let undecided = undecided.as_ref().filter(|_| is_unsolvable);
+        self.become_idle_because(undecided.or(Some(verdict)), &reasons, &unreached);
     }
 
-    fn become_idle_because(&mut self, verdict: Option<&Verdict>, dead_end: &[Reason]) {
+    fn become_idle_because(
+        &mut self,
+        verdict: Option<&Verdict>,
+        dead_end: &[Reason],
+        unreached: &[UnreachedGoal],
+    ) {
         let goals = self.with_goals(|goals, it| goals.become_idle(it, verdict));
         self.ports.recorder.record(&Entry::Resting {
             now: &self.now,
@@ -215,6 +230,7 @@ impl Run<'_> {
             verdict: verdict.filter(|_| !goals.is_empty()),
             goals: &goals,
             dead_end,
+            unreached,
         });
         if verdict == Some(&Verdict::GoalReached) {
             // The earlier history is not needed for explanations any more.

@@ -1,5 +1,6 @@
 //! End of a run: cancels running actions and waits for them to stop.
 
+use elbowroom_model::ground::Condition;
 use elbowroom_num::Rational;
 
 use super::agenda::{Next, PendingStep};
@@ -52,7 +53,9 @@ impl Run<'_> {
             }
         };
         let dead_end = match verdict {
-            Verdict::Unsolvable if self.history.is_explaining() => self.dead_end(),
+            Verdict::Unsolvable if self.history.is_explaining() => {
+                self.dead_end(self.unreachable_parts())
+            }
             _ => Vec::new(),
         };
         self.closing.begin(verdict, dead_end, &self.now);
@@ -95,12 +98,26 @@ impl Run<'_> {
             && self.plan_events.iter().any(is_change)
     }
 
-    /// Returns the parts of the goal that can never become true again, and since when.
-    pub(super) fn dead_end(&self) -> Vec<Reason> {
-        let conflict = self.goals.first_conflict(&self.task);
+    /// Returns the parts of the goal that can never become true again, and since when, as far as
+    /// that can be computed.
+    pub(super) fn unreachable_parts(&self) -> Option<Vec<(Condition, Reason)>> {
         let log = &self.action_log;
         self.history
-            .dead_end(&self.belief, log, &self.now, conflict)
+            .explain_unreachable_parts(&self.belief, log, &self.now)
+    }
+
+    /// Returns the reasons for which no plan reaches the goal, from its unreachable parts. Without
+    /// such a part, names the conditions that exclude each other.
+    pub(super) fn dead_end(&self, parts: Option<Vec<(Condition, Reason)>>) -> Vec<Reason> {
+        match parts {
+            None => Vec::new(),
+            Some(parts) if !parts.is_empty() => parts.into_iter().map(|it| it.1).collect(),
+            Some(_) => {
+                let conflict = self.goals.first_conflict(&self.task);
+                let reason = conflict.map(|it| it.reason());
+                vec![reason.unwrap_or_else(|| Reason::new(Cause::NotTogether))]
+            }
+        }
     }
 
     /// Ends the run, or requests another plan if facts or numbers have changed since the verdict.

@@ -11,7 +11,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use elbowroom::execution::run::{PROBLEM_GOAL_NAME, TimeoutRule, Verdict};
 use elbowroom::execution::{
     ActionHandle, BeliefState, Cause, Command, Decided, Decision, Doubt, Entry, Event, GoalTerms,
-    GuaranteeLevel, Observation, PreparedPlan, Request, StepId, WarningCause,
+    GuaranteeLevel, Observation, PreparedPlan, Reason, Request, StepId, UnreachedGoal,
+    WarningCause,
 };
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::model::{Situation, Task};
@@ -408,6 +409,7 @@ impl StatusData {
                 verdict,
                 goals,
                 dead_end,
+                unreached,
             } => {
                 self.now.clone_from(now);
                 self.steps.clear();
@@ -416,7 +418,6 @@ impl StatusData {
                 self.promise = None;
                 self.deviation = None;
                 self.decided = None;
-                let reasons: Vec<String> = dead_end.iter().map(ToString::to_string).collect();
                 let goals = goals.join(", ");
                 self.idle_reason = Some(match verdict {
                     None => NO_GOAL.to_owned(),
@@ -425,15 +426,11 @@ impl StatusData {
                         format!("reached: {goals}")
                     }
                     Some(verdict) => {
-                        let is_certain = **verdict == Verdict::Unsolvable;
-                        self.goals.mark_unplanned(is_certain, dead_end, now);
-                        let why = verdict.why().map(str::to_owned).into_iter().chain(reasons);
-                        let why: Vec<String> = why.collect();
+                        self.goals.mark_unplanned(unreached, now);
                         let words = verdict_text(verdict);
-                        if why.is_empty() {
-                            format!("{words}: {goals}")
-                        } else {
-                            format!("{words}: {goals}: {}", why.join("; "))
+                        match why_idle(verdict, dead_end, unreached) {
+                            Some(why) => format!("{words}: {goals}: {why}"),
+                            None => format!("{words}: {goals}"),
                         }
                     }
                 });
@@ -628,6 +625,31 @@ impl StatusData {
             Request::Resume => self.is_paused = false,
         }
     }
+}
+
+/// Returns the reasons for which an executive is idle without having reached its goals. Of several
+/// goals, each is named with its own reasons.
+fn why_idle(verdict: &Verdict, dead_end: &[Reason], unreached: &[UnreachedGoal]) -> Option<String> {
+    if unreached.len() < 2 {
+        let reasons = goals::joined(dead_end).into_iter();
+        let all: Vec<String> = verdict
+            .why()
+            .map(str::to_owned)
+            .into_iter()
+            .chain(reasons)
+            .collect();
+        return (!all.is_empty()).then(|| all.join("; "));
+    }
+    let words = unreached.iter().filter_map(|goal| {
+        let why = goals::joined(&goal.reasons)?;
+        let is_named = goal.reasons.iter().all(|it| it.cause == Cause::TooLate);
+        Some(if is_named {
+            why
+        } else {
+            format!("`{}`: {why}", goal.name)
+        })
+    });
+    Some(words.collect::<Vec<_>>().join("; "))
 }
 
 fn verdict_text(verdict: &Verdict) -> &'static str {

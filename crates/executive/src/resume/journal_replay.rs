@@ -51,7 +51,7 @@ impl JournalReplay {
             return self.difference().is_none();
         };
         self.look_ahead(index + 1);
-        if stored != line && self.difference().is_none() {
+        if !stored.agrees_with(line) && self.difference().is_none() {
             self.difference.store(index + self.first, Ordering::SeqCst);
         }
         false

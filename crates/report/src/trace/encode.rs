@@ -3,7 +3,7 @@
 use elbowroom_execution::run::{ExecutedStep, Report, Verdict};
 use elbowroom_execution::{
     ActionHandle, Command, Decision, Ending, Entry, Event, GoalChange, Measured, Observation,
-    Order, Planned, PreparedPlan, Reason, Request, WarningCause,
+    Order, Planned, PreparedPlan, Reason, Request, UnreachedGoal, WarningCause,
 };
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::{Interval, Rational};
@@ -15,8 +15,8 @@ use super::schema::{
     GoalChangeLine, GoalLookLine, GoalState, IdleLine, InstanceLine, InterruptedLine, IntervalLine,
     IssuedCommandLine, KeptPlanLine, Line, NetworkLine, ObservationLine, ObservedLine, OrderLine,
     ParameterLine, PlanLine, PlannedLine, PlanningLine, ReasonLine, ReportLine, RunningLine,
-    ShortfallLine, SituationLine, StepLine, TermsLine, TimeAdvanceLine, WarningLine, WindowLine,
-    WorldFailedLine,
+    ShortfallLine, SituationLine, StepLine, TermsLine, TimeAdvanceLine, UnreachedLine, WarningLine,
+    WindowLine, WorldFailedLine,
 };
 use crate::exact::Exact;
 
@@ -138,12 +138,15 @@ impl Line {
                 verdict,
                 goals,
                 dead_end,
+                unreached,
             } => Self::Resting(IdleLine {
                 now: exact(now),
                 verdict: verdict.map(|it| it.name().to_owned()),
                 why: verdict.and_then(Verdict::why).map(str::to_owned),
                 goals: goals.to_vec(),
                 dead_end: dead_end.iter().map(ReasonLine::of).collect(),
+                unreached: (!unreached.is_empty())
+                    .then(|| unreached.iter().map(unreached_line).collect()),
             }),
             Entry::Interrupted { now } => Self::Interrupted(InterruptedLine { now: exact(now) }),
             Entry::WorldFailed { now, why } => Self::WorldFailed(WorldFailedLine {
@@ -152,6 +155,32 @@ impl Line {
             }),
             Entry::Over(report) => Self::Over(ReportLine::of(report)),
         }
+    }
+}
+
+impl Line {
+    /// Returns `true` if a replay with this line reproduces the stored line `self`. Fields that
+    /// earlier versions did not write are not compared.
+    pub fn agrees_with(&self, replayed: &Self) -> bool {
+        match (self, replayed) {
+            (Self::Resting(stored), Self::Resting(replayed)) if stored.unreached.is_none() => {
+                let unreached = None;
+                *stored
+                    == IdleLine {
+                        unreached,
+                        ..replayed.clone()
+                    }
+            }
+            _ => self == replayed,
+        }
+    }
+}
+
+fn unreached_line(goal: &UnreachedGoal) -> UnreachedLine {
+    UnreachedLine {
+        name: goal.name.clone(),
+        impossible: goal.is_impossible,
+        reasons: goal.reasons.iter().map(ReasonLine::of).collect(),
     }
 }
 

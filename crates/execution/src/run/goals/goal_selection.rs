@@ -150,7 +150,10 @@ impl GoalManager<'_> {
         match verdict {
             Verdict::GoalReached => self.pursue_goals_set_aside(ctx),
             Verdict::Unsolvable | Verdict::NoPlan { .. } => {
-                self.select_after_closing(ctx) || self.select_after_failure(ctx)
+                self.select_after_closing(ctx) || {
+                    self.note_failed_search(verdict);
+                    self.select_after_failure(ctx)
+                }
             }
             _ => {
                 self.pursue_all(ctx);

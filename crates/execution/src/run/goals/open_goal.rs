@@ -5,6 +5,7 @@ use elbowroom_model::{Task, problem};
 
 use super::PROBLEM_GOAL_NAME;
 use crate::event::GoalTerms;
+use crate::run::settings::Verdict;
 
 /// Reason for which a goal is queued.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -63,6 +64,8 @@ pub(super) struct OpenGoal {
     pub(super) missed_deadline: Option<String>,
     /// `true` if a certificate proves that it misses its deadline, whichever other goals are pursued.
     pub(super) is_proven_late: bool,
+    /// The result of the last search for a plan for this goal alone, if it has failed.
+    pub(super) failed_search: Option<Verdict>,
     /// `true` if the record contains that it is set aside.
     pub(super) is_announced: bool,
     /// The reason for which it is queued, if it is.
@@ -87,6 +90,7 @@ impl OpenGoal {
             set_aside: None,
             missed_deadline: None,
             is_proven_late: false,
+            failed_search: None,
             is_announced: false,
             wait: Wait::default(),
         }

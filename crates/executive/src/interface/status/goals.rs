@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use elbowroom::execution::{GoalChange, GoalTerms, Reason};
+use elbowroom::execution::{GoalChange, GoalTerms, Reason, UnreachedGoal};
 use elbowroom::num::Rational;
 use elbowroom::report::exact::Exact;
 use elbowroom::report::trace::{ClosedGoalLine, GoalLine, SnapshotLine, WaitLine};
@@ -191,23 +191,21 @@ impl GoalList {
         }
     }
 
-    /// Marks the open goals after a failed search for a plan. Pursued goals become impossible if it
-    /// `is_certain` that no plan exists, otherwise unplanned. Goals that are still set aside are
-    /// impossible. Of several pursued goals, each gets the reasons about its own parts.
-    pub(super) fn mark_unplanned(&mut self, is_certain: bool, reasons: &[Reason], now: &Rational) {
-        let pursued = self.open.iter().filter(|goal| goal.state == PURSUED);
-        let is_alone = pursued.count() == 1;
+    /// Marks the open goals without a plan as impossible, as far as that is proven, and otherwise
+    /// as unplanned.
+    pub(super) fn mark_unplanned(&mut self, unreached: &[UnreachedGoal], now: &Rational) {
         for goal in self.open.iter_mut().filter(|it| !is_waiting(it)) {
-            let is_pursued = goal.state == PURSUED;
-            let is_unplanned = is_pursued && !is_certain;
-            let state = if is_unplanned { UNPLANNED } else { IMPOSSIBLE };
+            let Some(found) = unreached.iter().find(|it| it.name == goal.name) else {
+                continue;
+            };
+            let state = if found.is_impossible {
+                IMPOSSIBLE
+            } else {
+                UNPLANNED
+            };
             state.clone_into(&mut goal.state);
             goal.since = Exact(now.clone());
-            if is_pursued {
-                let own = reasons.iter().filter(|it| is_alone || concerns(it, goal));
-                let own: Vec<String> = own.map(ToString::to_string).collect();
-                goal.why = (!own.is_empty()).then(|| own.join("; "));
-            }
+            goal.why = joined(&found.reasons);
         }
     }
 
@@ -278,83 +276,8 @@ fn closed(line: &ClosedGoalLine) -> GoalNow {
     }
 }
 
-/// Returns `true` if a reason names this goal, or is only about conditions in its text.
-fn concerns(reason: &Reason, goal: &GoalNow) -> bool {
-    let about = reason.about.as_ref().map(ToString::to_string);
-    let about = about.unwrap_or_default();
-    if about.starts_with(&format!("`{}` ", goal.name)) {
-        return true;
-    }
-    let text = spaced(&goal.goal);
-    let mut conditions = conditions(&about).peekable();
-    conditions.peek().is_some() && conditions.all(|it| text.contains(&spaced(it)))
-}
-
-/// Returns the outermost parenthesized parts of a text.
-fn conditions(text: &str) -> impl Iterator<Item = &str> {
-    let mut depth = 0_usize;
-    let mut begin = 0;
-    text.char_indices().filter_map(move |(place, letter)| {
-        match letter {
-            '(' => {
-                if depth == 0 {
-                    begin = place;
-                }
-                depth += 1;
-            }
-            ')' => {
-                depth = depth.saturating_sub(1);
-                return (depth == 0).then(|| &text[begin..=place]);
-            }
-            _ => {}
-        }
-        None
-    })
-}
-
-/// Returns a condition in lower case, with single spaces and none beside parentheses.
-fn spaced(text: &str) -> String {
-    let words: Vec<&str> = text.split_whitespace().collect();
-    let text = words.join(" ").to_lowercase();
-    text.replace("( ", "(").replace(" )", ")")
-}
-
-#[cfg(test)]
-mod tests {
-    use elbowroom::execution::{Cause, Subject};
-    use elbowroom::num::Rational;
-
-    use super::*;
-
-    #[test]
-    fn reasons_concern_the_goals_with_their_conditions() {
-        let goal = GoalNow {
-            name: "berth".to_owned(),
-            goal: "(AND (berthed  s1) ( free-berth ))".to_owned(),
-            value: Exact(Rational::ONE),
-            deadline: None,
-            release: None,
-            keep: false,
-            by: None,
-            state: PURSUED.to_owned(),
-            given: None,
-            since: Exact(Rational::ZERO),
-            why: None,
-        };
-        let cases = [
-            ("`(berthed s1)` and `(free-berth)`", true),
-            ("(berthed s1)", true),
-            ("`(berthed s1)` and `(offshore s1)`", false),
-            ("(quay k1)", false),
-            ("`berth` would be reached 5 s late", true),
-            ("`other` would be reached 5 s late", false),
-            ("(open", false),
-            ("", false),
-        ];
-        for (about, expected) in cases {
-            let subject = Subject::ExternalMessage(about.to_owned());
-            let reason = Reason::new(Cause::NotTogether).about(subject);
-            assert_eq!(concerns(&reason, &goal), expected, "{about}");
-        }
-    }
+/// Returns the reasons in words, if there are any.
+pub(super) fn joined(reasons: &[Reason]) -> Option<String> {
+    let words: Vec<String> = reasons.iter().map(ToString::to_string).collect();
+    (!words.is_empty()).then(|| words.join("; "))
 }

@@ -248,6 +248,23 @@ fn conflict_within_one_goal_is_named_when_idle() {
 }
 
 #[test]
+fn each_goal_without_plan_has_its_own_reasons_when_idle() {
+    let script = vec![
+        (0, pursue("two", "(and (at home) (at ward))")),
+        (0, pursue_by("late", "(at ward)", 5)),
+    ];
+    let told = run(&task_with_rooms("(and (at lab) (at ward))"), 4, script);
+    assert_has(
+        &told,
+        &[
+            "`problem` impossible: `(at lab)` and `(at ward)` exclude each other",
+            "`two` impossible: `(at home)` and `(at ward)` exclude each other",
+            "`late` impossible: `late` would be reached 5.001 s late: it cannot be reached before 10.001",
+        ],
+    );
+}
+
+#[test]
 fn conflict_within_one_goal_is_the_reason_for_setting_it_aside() {
     let script = vec![(0, pursue("both", "(and (at home) (at lab))"))];
     let told = run(&task_with_rooms("(at ward)"), 100, script);

@@ -237,7 +237,11 @@ impl Case {
 fn plain(line: &str) -> Line {
     let mut line: Line = serde_json::from_str(line).expect("a line");
     match &mut line {
-        Line::Resting(resting) => resting.dead_end.clear(),
+        Line::Resting(resting) => {
+            resting.dead_end.clear();
+            let unreached = resting.unreached.iter_mut().flatten();
+            unreached.for_each(|goal| goal.reasons.clear());
+        }
         Line::Over(report) => {
             report.executed.clear();
             report.reasons.clear();

@@ -167,6 +167,7 @@ impl Recorder for Notes {
                 verdict,
                 goals,
                 dead_end,
+                unreached,
             } => {
                 let verdict = verdict.map_or("no goals", Verdict::name);
                 let goals = [goals.join(" ")].into_iter();
@@ -174,6 +175,16 @@ impl Recorder for Notes {
                     .chain(dead_end.iter().map(ToString::to_string))
                     .collect();
                 self.note(format!("{}: rest: {verdict} {}", at(now), words.join(": ")));
+                // Of one goal, the reasons are those of the dead end.
+                for goal in unreached.iter().filter(|_| unreached.len() > 1) {
+                    let state = if goal.is_impossible {
+                        "impossible"
+                    } else {
+                        "unplanned"
+                    };
+                    let words: Vec<String> = goal.reasons.iter().map(ToString::to_string).collect();
+                    self.note(format!("`{}` {state}: {}", goal.name, words.join("; ")));
+                }
             }
             Entry::Warning {
                 now, action, until, ..
