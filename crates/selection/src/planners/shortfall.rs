@@ -64,7 +64,10 @@ impl Embedded<'_> {
         let any_ends = with_any_ends(situation);
         let least = earliest_times(task, &any_ends, &conditions, &mut effort);
         let mut least = least.unwrap_or_default().into_iter();
-        let found = self.without_deadlines(task, situation);
+        // A plan for several goals may reach each of them later than necessary.
+        let is_alone = deadlines.len() == 1 && task.goal().conjuncts().is_empty();
+        let found = is_alone.then(|| self.without_deadlines(task, situation));
+        let found = found.flatten();
         let late = deadlines
             .iter()
             .enumerate()
