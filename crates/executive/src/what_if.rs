@@ -76,23 +76,11 @@ pub(crate) fn what_if(
     confirm_starts(&mut belief, &before, &now);
     let slack_now = before.least_slack();
     let pursued = goals_in(&before, &["pursued"]);
-    let snapshot = snapshot(&before, &belief, now.clone());
     let event = request.event(&now, &task);
     let request = event.map(|event| Observation { time: now, event });
-    let model = WorldModel::without_deviations();
-    let mut world = AskingWorld {
-        inner: SimWorld::mid_execution(&belief, &model, 0, &ObservedChanges::default()),
-        request,
-    };
-    let course = Course {
-        status: before,
-        name: name.clone(),
-        found: Arc::default(),
-    };
-    let (found, after) = (Arc::clone(&course.found), course.status.clone());
     let inputs = inputs.without_planning_time(task);
-    simulate(&inputs, snapshot, course, &mut world)
-        .map_err(|error| Error::new(error.to_string(), "correct the options of the executive"))?;
+    let unasked = before.fork();
+    let (found, after) = simulate(&inputs, before, &belief, request, vec![name.clone()])?;
     let goal = after.goal(&name);
     let searches_left = found.searches.load(Ordering::SeqCst) <= MAX_SEARCHES;
     let is_over = found.is_over.load(Ordering::SeqCst) && searches_left;
@@ -112,6 +100,16 @@ pub(crate) fn what_if(
         _ => "undecided".to_owned(),
     };
     let missed = goals_in(&after, &MISSED_STATES);
+    let missed: Vec<String> = pursued
+        .into_iter()
+        .filter(|it| missed.contains(it))
+        .collect();
+    let missed_anyway = if missed.is_empty() {
+        Vec::new()
+    } else {
+        let (_, after) = simulate(&inputs, unasked, &belief, None, missed.clone())?;
+        goals_in(&after, &MISSED_STATES)
+    };
     let is_achieved = verdict == "achieved";
     Ok(WhatIf {
         done: goal
@@ -124,9 +122,9 @@ pub(crate) fn what_if(
         }),
         slack_now: slack_now.map(Exact),
         slack_then: slack_then.map(Exact).filter(|_| is_achieved),
-        missed: pursued
+        missed: missed
             .into_iter()
-            .filter(|it| missed.contains(it))
+            .filter(|it| !missed_anyway.contains(it))
             .collect(),
         verdict,
     })
@@ -137,8 +135,34 @@ fn is_decided(state: &str) -> bool {
     FINAL_STATES.contains(&state) || MISSED_STATES.contains(&state)
 }
 
-/// Executes the simulation until the goal has its final state.
+/// Simulates the run of this status from this belief on, with a request if there is one, until the goals have their
+/// final states. Returns the observations and the status at the end.
 fn simulate(
+    inputs: &RunInputs,
+    status: Status,
+    belief: &BeliefState,
+    request: Option<Observation>,
+    names: Vec<String>,
+) -> Result<(Arc<Found>, Status), Error> {
+    let snapshot = snapshot(&status, belief, status.now());
+    let model = WorldModel::without_deviations();
+    let mut world = AskingWorld {
+        inner: SimWorld::mid_execution(belief, &model, 0, &ObservedChanges::default()),
+        request,
+    };
+    let course = Course {
+        status,
+        names,
+        found: Arc::default(),
+    };
+    let outcome = (Arc::clone(&course.found), course.status.clone());
+    execute(inputs, snapshot, course, &mut world)
+        .map_err(|error| Error::new(error.to_string(), "correct the options of the executive"))?;
+    Ok(outcome)
+}
+
+/// Executes the simulation until the goals have their final states.
+fn execute(
     inputs: &RunInputs,
     snapshot: RunSnapshot,
     course: Course,
@@ -335,10 +359,10 @@ impl World for AskingWorld<'_> {
     }
 }
 
-/// Recorder that follows the simulation until the goal has its final state.
+/// Recorder that follows the simulation until the goals have their final states.
 struct Course {
     status: Status,
-    name: String,
+    names: Vec<String>,
     found: Arc<Found>,
 }
 
@@ -377,19 +401,23 @@ impl Recorder for Course {
             }
             _ => {}
         }
-        let Some(goal) = self.status.goal(&self.name) else {
+        let goals = self.names.iter().map(|name| self.status.goal(name));
+        let Some(goals) = goals.collect::<Option<Vec<GoalNow>>>() else {
             found.is_over.fetch_or(is_over, Ordering::SeqCst);
             return;
         };
-        let is_planned = matches!(entry, Entry::Decided { .. }) && goal.state == "pursued";
+        let is_pursued = goals.iter().any(|goal| goal.state == "pursued");
+        let is_planned = matches!(entry, Entry::Decided { .. }) && is_pursued;
         if is_planned {
             let mut slack = found.slack.lock().unwrap_or_else(PoisonError::into_inner);
             if slack.is_none() {
                 *slack = self.status.least_slack();
             }
         }
-        is_over |= FINAL_STATES.contains(&goal.state.as_str());
-        is_over |= matches!(entry, Entry::Resting { .. }) && goal.state != "queued";
+        let is_idle = matches!(entry, Entry::Resting { .. });
+        is_over |= goals.iter().all(|goal| {
+            FINAL_STATES.contains(&goal.state.as_str()) || is_idle && goal.state != "queued"
+        });
         found.is_over.fetch_or(is_over, Ordering::SeqCst);
     }
 }

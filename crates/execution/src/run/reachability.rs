@@ -4,9 +4,9 @@
 //! and time. No plan can reach anything else.
 
 use elbowroom_model::ground::Condition;
-use elbowroom_model::{Situation, Task, reachability};
-use elbowroom_num::Interval;
+use elbowroom_model::{Task, reachability};
 
+use super::situation::{OverrunEstimate, situation_at};
 use crate::belief_state::BeliefState;
 
 /// Limit on the work of reachability for an explanation: about a second.
@@ -29,15 +29,9 @@ pub(super) fn unreachable_conditions(state: &BeliefState) -> Vec<Condition> {
 
 /// Returns the unreachable parts of the goal, if they can be computed within the limit.
 pub(super) fn unreachable(state: &BeliefState, step_limit: u64) -> Option<Vec<Condition>> {
-    let running = state.running().values().map(|underway| {
-        let duration = Interval::point(underway.planned.clone());
-        state.running_action(underway, duration)
-    });
-    let situation = Situation {
-        time: state.time().clone(),
-        state: state.state(),
-        running: running.collect(),
-    };
+    // A late action may still end.
+    let soon = OverrunEstimate::AsSoonAsPossible;
+    let (situation, _) = situation_at(state, state.time().clone(), soon);
     let task = Task::starting_from(state.task(), &situation);
     let settings = reachability::Settings {
         step_limit,

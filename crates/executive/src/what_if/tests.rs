@@ -7,7 +7,8 @@ use elbowroom::answers::NoObserver;
 use elbowroom::answers::run::run;
 use elbowroom::execute::{NamedText, RunInputs, RunSpec};
 use elbowroom::execution::{
-    Command, Event, Observation, PlanForm, Preparer as _, Recorder, TimeAdvance, World, WorldError,
+    Command, Event, Observation, PlanForm, Preparer as _, Recorder, Request, TimeAdvance, World,
+    WorldError,
 };
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::model::{Step, TimeTriggeredPlan};
@@ -81,7 +82,18 @@ struct Scripted<'m> {
     at: Rational,
     questions: Vec<NewGoal>,
     given: Option<NewGoal>,
+    /// The run is paused before the goal is given, and the questions come after it.
+    pauses: bool,
     answers: Vec<WhatIf>,
+}
+
+impl Scripted<'_> {
+    fn ask(&mut self) {
+        for question in std::mem::take(&mut self.questions) {
+            let answer = what_if(self.inputs, &self.status, question);
+            self.answers.push(answer.expect("a valid goal"));
+        }
+    }
 }
 
 impl World for Scripted<'_> {
@@ -91,6 +103,9 @@ impl World for Scripted<'_> {
 
     fn wait(&mut self, until: &Rational) -> Result<TimeAdvance, WorldError> {
         let is_before = self.status.now() < self.at;
+        if self.pauses && self.given.is_none() {
+            self.ask();
+        }
         let until = if is_before {
             until.min(&self.at)
         } else {
@@ -99,11 +114,16 @@ impl World for Scripted<'_> {
         let mut passage = self.inner.wait(until)?;
         self.status.set_time(&passage.now);
         if passage.now >= self.at {
-            for question in std::mem::take(&mut self.questions) {
-                let answer = what_if(self.inputs, &self.status, question);
-                self.answers.push(answer.expect("a valid goal"));
+            if !self.pauses {
+                self.ask();
             }
             if let Some(given) = self.given.take() {
+                if self.pauses {
+                    passage.observations.push(Observation {
+                        time: passage.now.clone(),
+                        event: Event::Requested(Request::Pause),
+                    });
+                }
                 let named = NewGoal {
                     name: Some("given".to_owned()),
                     ..given
@@ -135,6 +155,18 @@ fn executed(
     questions: Vec<NewGoal>,
     given: Option<NewGoal>,
 ) -> (String, Vec<WhatIf>, Status) {
+    executed_with(at, questions, given, false, 2)
+}
+
+/// Like [`executed`]. With `pauses`, the goal is given in a pause, and then the questions are asked. Each action takes
+/// `seconds`; two are planned.
+fn executed_with(
+    at: &Rational,
+    questions: Vec<NewGoal>,
+    given: Option<NewGoal>,
+    pauses: bool,
+    seconds: usize,
+) -> (String, Vec<WhatIf>, Status) {
     let inputs = read(spec());
     let task = inputs.task();
     let status = Status::new(task, inputs.spec().timeout.clone());
@@ -143,7 +175,10 @@ fn executed(
         status.clone(),
         TraceBuffer::default(),
     );
-    let model = WorldModel::without_deviations();
+    let model = format!(
+        "format = \"elbowroom-world\"\nversion = 1\n[[duration]]\naction = \"do\"\nuniform = {{ from = {seconds}, to = {seconds} }}\n"
+    );
+    let model = WorldModel::read(&model, task.problem()).expect("a correct test");
     let mut world = Scripted {
         inner: SimWorld::new(Arc::clone(task), &model, 0),
         inputs: &inputs,
@@ -151,6 +186,7 @@ fn executed(
         at: at.clone(),
         questions,
         given,
+        pauses,
         answers: Vec::new(),
     };
     let mut trace = String::new();
@@ -238,6 +274,36 @@ fn answers_agree_with_runs_in_which_the_goals_are_given() {
         verdicts.contains("achieved") && verdicts.len() > 1,
         "{verdicts:?}"
     );
+}
+
+#[test]
+fn goals_that_are_missed_anyway_are_not_attributed_to_the_question() {
+    let missed = |given: NewGoal, question: NewGoal| {
+        let (_, answers, _) = executed_with(&Rational::ONE, vec![question], Some(given), true, 2);
+        answers.into_iter().next().expect("an answer").missed
+    };
+    let valuable = NewGoal {
+        value: Some(GivenNumber(Rational::from(5))),
+        ..goal("(done c2)", Some(4))
+    };
+    let none = Vec::<String>::new();
+    assert_eq!(missed(goal("(done d1)", None), valuable.clone()), none);
+    let other = goal("(done c1)", Some(1));
+    assert_eq!(missed(other, valuable.clone()), none);
+    // Two robots cannot do two more errands in time.
+    let possible = missed(goal("(and (done b2) (done a2))", Some(4)), valuable);
+    assert_eq!(possible, ["given".to_owned()]);
+}
+
+#[test]
+fn late_action_makes_no_goal_impossible() {
+    let at = Rational::new(9, 4);
+    let question = goal("(and (done a1) (done d1))", None);
+    let (_, answers, _) = executed_with(&at, vec![question], None, false, 3);
+    let why = answers[0].why.as_deref().expect("a reason");
+    assert!(why.contains("(done d1)"), "{why}");
+    assert!(!why.contains("(done a1)"), "{why}");
+    assert_eq!(answers[0].missed, Vec::<String>::new());
 }
 
 #[test]
