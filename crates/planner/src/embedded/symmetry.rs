@@ -139,8 +139,8 @@ struct Finder<'a> {
     compiled: &'a Compiled,
     facts: Map<(u32, Vec<ObjectId>), u32>,
     fluents: Map<(u32, Vec<ObjectId>), u32>,
-    /// By schema, arguments, and whether the action is durative.
-    actions: Map<(u32, Vec<ObjectId>, bool), u32>,
+    /// The forms of each action, by schema, arguments, and whether the action is durative.
+    actions: Map<(u32, Vec<ObjectId>, bool), Vec<u32>>,
     budget: usize,
 }
 
@@ -160,19 +160,20 @@ impl<'a> Finder<'a> {
             let (function, arguments) = task.application(fluent);
             (function.0, arguments)
         });
-        let actions = (0..).zip(&compiled.actions);
-        let actions = actions.filter(|(_, action)| action.start != NONE);
+        let mut actions: Map<_, Vec<u32>> = Map::default();
+        for (number, action) in (0..).zip(&compiled.actions) {
+            if action.start != NONE {
+                let arguments = action.arguments.clone();
+                let key = (action.schema.0, arguments, action.end != NONE);
+                actions.entry(key).or_default().push(number);
+            }
+        }
         Self {
             task,
             compiled,
             facts: facts.zip(0..).collect(),
             fluents: fluents.zip(0..).collect(),
-            actions: actions
-                .map(|(number, action)| {
-                    let arguments = action.arguments.clone();
-                    ((action.schema.0, arguments, action.end != NONE), number)
-                })
-                .collect(),
+            actions,
             budget: compiled.tuning.most_symmetry_comparisons,
         }
     }
@@ -198,9 +199,12 @@ impl<'a> Finder<'a> {
                 }
                 continue;
             }
-            let arguments = swapped(&action.arguments, pair);
-            let key = (action.schema.0, arguments, action.end != NONE);
-            let image = *self.actions.get(&key)?;
+            let key = |arguments| (action.schema.0, arguments, action.end != NONE);
+            // Both actions have their forms in the same order.
+            let own = self.actions.get(&key(action.arguments.clone()))?;
+            let form = own.binary_search(&number).ok()?;
+            let images_of = self.actions.get(&key(swapped(&action.arguments, pair)))?;
+            let image = *images_of.get(form)?;
             let other = self.compiled.action(image);
             if !images.are_alike(self.compiled, action, other) {
                 return None;
