@@ -26,6 +26,7 @@ mod own_start;
 mod reads;
 mod rules;
 mod symbols;
+mod tariffs;
 mod times;
 mod unfolded;
 mod unsupported;

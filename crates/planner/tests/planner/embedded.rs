@@ -25,6 +25,7 @@ mod resources;
 mod self_overlap;
 mod simultaneity;
 mod situations;
+mod tariffs;
 mod threads;
 mod trajectory;
 mod trajectory_reference;

@@ -25,6 +25,7 @@ use super::macros::Macro;
 use super::metric::Draft;
 use super::reads::{read_action, visit_changes, visit_disputed};
 use super::symbols::Symbols;
+use super::tariffs::variants_by_tariffs;
 use super::times::has_fixed_numbers;
 use super::unfolded::unfolded;
 use super::unsupported::{Unsupported, check};
@@ -32,7 +33,7 @@ use super::without_duration::{takes_no_time, without_duration};
 use super::{Action, Compiled, Compressibility, Dates, Duration, Flow, NONE, Snap};
 use crate::embedded::formula::Formula;
 use crate::embedded::time::{Scale, Ticks};
-use crate::embedded::tuning::Tuning;
+use crate::embedded::tuning::{Technique, Tuning};
 
 /// Number of actions compiled between two calls of `may_continue`.
 const ACTIONS_PER_QUESTION: usize = 256;
@@ -64,7 +65,7 @@ pub(crate) fn compile(
     may_continue: &mut dyn FnMut() -> bool,
 ) -> Result<Compiled, Failure> {
     let CompileInput { situation, .. } = wanted;
-    let mut full = full_actions(task, grounding, may_continue).ok_or(Failure::Stopped)?;
+    let full = full_actions(task, grounding, may_continue).ok_or(Failure::Stopped)?;
     if !may_continue() {
         return Err(Failure::Stopped);
     }
@@ -77,6 +78,13 @@ pub(crate) fn compile(
         unfolded(grounding)
     };
     let grounding = unfolded.as_ref().unwrap_or(folded);
+    let variants = wanted
+        .tuning
+        .uses(Technique::Calendars)
+        .then(|| variants_by_tariffs(task, grounding, situation, wanted.metric))
+        .flatten();
+    let grounding = variants.as_ref().map_or(grounding, |v| &v.grounding);
+    let is_original = unfolded.is_none() && variants.is_none();
     builder.links = Links::new(has_fixed_numbers);
     if !has_fixed_numbers {
         builder.moving = moving_fluents(grounding);
@@ -103,8 +111,9 @@ pub(crate) fn compile(
         builder.running(&running.action);
     }
     for (number, action) in grounding.actions.iter().enumerate() {
-        let full = full.get_mut(number).and_then(Option::take);
-        let full = full.or_else(|| unfolded.as_ref().map(|_| folded.actions[number].clone()));
+        let origin = variants.as_ref().map_or(number, |v| v.origins[number]);
+        let full = full.get(origin).cloned().flatten();
+        let full = full.or_else(|| (!is_original).then(|| folded.actions[origin].clone()));
         if builder.moving.is_empty() {
             builder.action(action, full.as_ref());
             builder.action_without_duration(action, full.as_ref());

@@ -57,6 +57,20 @@ impl Metric {
     }
 }
 
+/// Returns the expression of the metric. Unknown fluents have the greatest number.
+pub(super) fn ground_metric(task: &Task) -> Option<Expression> {
+    let metric = task.problem().metric.as_ref()?;
+    Some(metric.expression.map_fluents(&mut |fluent| {
+        let objects = fluent.arguments.iter().map(|term| match term {
+            Term::Object(object) => Some(*object),
+            Term::Variable(_) => None,
+        });
+        let objects: Option<Vec<ObjectId>> = objects.collect();
+        let found = objects.and_then(|objects| task.find_fluent(fluent.function, &objects));
+        found.unwrap_or(FluentId(u32::MAX))
+    }))
+}
+
 /// The metric while symbols are being numbered.
 #[derive(Debug)]
 pub(super) struct Draft {
@@ -86,17 +100,9 @@ impl Draft {
     ) -> Option<Self> {
         let metric = task.problem().metric.as_ref()?;
         let values = &situation.state.values;
+        let ground = ground_metric(task)?;
         let mut is_defined = true;
-        let ground = metric.expression.map_fluents(&mut |fluent| {
-            let objects = fluent.arguments.iter().map(|term| match term {
-                Term::Object(object) => Some(*object),
-                Term::Variable(_) => None,
-            });
-            let objects: Option<Vec<ObjectId>> = objects.collect();
-            let found = objects.and_then(|objects| task.find_fluent(fluent.function, &objects));
-            is_defined &= found.is_some_and(|found| values.contains_key(&found));
-            found.unwrap_or(FluentId(u32::MAX))
-        });
+        ground.visit_fluents(&mut |fluent| is_defined &= values.contains_key(&fluent));
         ground.visit_leaves(&mut |leaf| {
             // The validator counts violations of preferences.
             is_defined &= !matches!(leaf, Expression::Violations(_));

@@ -1,10 +1,7 @@
 //! Calendars in problems whose numbers depend on times, and numeric calendars.
 
-use std::ops::ControlFlow;
-
 use elbowroom_model::validate::{Settings as Strictness, Verdict};
 use elbowroom_model::{Situation, validate_from};
-use elbowroom_planner::embedded::{self, Settings as PlanSettings};
 use proptest::prelude::*;
 
 use crate::embedded::world::{answer, answer_from, describe, makespan, task};
@@ -121,69 +118,6 @@ fn water_that_never_is_deep_enough_is_no_plan() {
         (at 8 (= (depth y) 2)))";
     let answer = answer(TIDES, &format!("{init} (:goal (at b y))"));
     assert!(answer.found().is_none(), "{}", describe(&answer));
-}
-
-/// Machines wash while the price of electricity is low; each load costs the price at its end.
-const LAUNDRY: &str = "
-    (:requirements :typing :durative-actions :numeric-fluents :timed-initial-literals)
-    (:types machine load)
-    (:predicates (idle ?m - machine) (dirty ?l - load) (clean ?l - load))
-    (:functions (price) (cost))
-    (:durative-action wash :parameters (?m - machine ?l - load) :duration (= ?duration 10)
-      :condition (and (at start (idle ?m)) (at start (dirty ?l)) (over all (<= (price) 3)))
-      :effect (and (at start (not (idle ?m))) (at start (not (dirty ?l)))
-        (at end (idle ?m)) (at end (clean ?l)) (at end (increase (cost) (price)))))";
-
-#[test]
-fn metric_of_a_timed_fluent_does_not_delay_the_first_plan() {
-    let loads: Vec<String> = (0..8).map(|load| format!("l{load}")).collect();
-    let of_all = |fact: &str| -> String {
-        loads
-            .iter()
-            .map(|load| format!(" ({fact} {load})"))
-            .collect()
-    };
-    let tariff = |round: usize| {
-        let low = 20 + 40 * round;
-        let (rise, price) = (low + 12, 2 + round % 2);
-        format!(" (at {low} (= (price) {price})) (at {rise} (= (price) 5))")
-    };
-    let tariffs: String = (0..8).map(tariff).collect();
-    let problem = format!(
-        "(:objects a b - machine {} - load)
-         (:init (idle a) (idle b) (= (price) 5) (= (cost) 0){}{tariffs})
-         (:goal (and{})) (:metric minimize (cost))",
-        loads.join(" "),
-        of_all("dirty"),
-        of_all("clean"),
-    );
-    let task = task(LAUNDRY, &problem);
-    let states_before_first_plan = |first_plan_only: bool| {
-        let settings = PlanSettings {
-            first_plan_only,
-            ..PlanSettings::default()
-        };
-        let mut states = None;
-        let situation = Situation::initial(&task);
-        let answer = embedded::plan(&task, &situation, &settings, &mut |progress| {
-            if progress.best.is_some() && states.is_none() {
-                states = Some(progress.counts.evaluated);
-            }
-            match progress.counts.evaluated {
-                0..3000 => ControlFlow::Continue(()),
-                _ => ControlFlow::Break(()),
-            }
-        });
-        (
-            states,
-            answer.found().and_then(|found| found.metric.clone()),
-        )
-    };
-    let (alone, first_cost) = states_before_first_plan(true);
-    let (states, best_cost) = states_before_first_plan(false);
-    assert!(alone.is_some());
-    assert_eq!(states, alone);
-    assert!(best_cost <= first_cost, "{first_cost:?} {best_cost:?}");
 }
 
 proptest! {
