@@ -33,6 +33,7 @@ pub mod pairs;
 mod processes;
 mod relevance;
 mod static_facts;
+mod timed_numbers;
 mod valueless;
 
 use std::collections::BTreeMap;

@@ -73,16 +73,14 @@ impl EarliestTimes<'_> {
                     .filter_map(|part| self.next(part, time, held_to));
                 times.min()
             }
-            Condition::Compare(comparison, left, right) => {
-                let sides = [left, right].map(|side| self.static_facts.value(self.task, side));
-                let can_hold = match sides {
-                    [Value::Known(left), Value::Known(right)] => comparison.holds(&left, &right),
-                    [Value::Undefined, _] | [_, Value::Undefined] => false,
-                    _ => true,
-                };
-                can_hold.then(|| time.clone())
-            }
-            Condition::Not(part) => (!self.is_always_true(part)).then(|| time.clone()),
+            Condition::Compare(..) => match self.spans_of_comparison(condition, true) {
+                Some(spans) => first_fit(&spans, time, length),
+                None => self.has_values(condition).then(|| time.clone()),
+            },
+            Condition::Not(part) => match self.spans_of_comparison(part, false) {
+                Some(spans) => first_fit(&spans, time, length),
+                None => (!self.is_always_true(part)).then(|| time.clone()),
+            },
         }
     }
 
@@ -94,14 +92,7 @@ impl EarliestTimes<'_> {
         held_to: ConditionContext,
     ) -> Option<Rational> {
         if let Some(spans) = self.static_facts.spans(fact) {
-            return spans.iter().find_map(|(from, until)| {
-                let least = Rational::max(from.clone(), time.clone());
-                let end = &least + length;
-                until
-                    .as_ref()
-                    .is_none_or(|until| end <= *until)
-                    .then_some(least)
-            });
+            return first_fit(spans, time, length);
         }
         match held_to {
             ConditionContext::StaticOnly => Some(time.clone()),
@@ -110,6 +101,26 @@ impl EarliestTimes<'_> {
                 Some(Rational::max(from.clone(), time.clone()))
             }
         }
+    }
+
+    /// Returns the intervals in which the condition may have this truth, if it is a comparison of numbers that
+    /// only timed initials change, or nothing.
+    fn spans_of_comparison(&self, condition: &Condition, truth: bool) -> Option<Vec<Span>> {
+        let Condition::Compare(comparison, left, right) = condition else {
+            return None;
+        };
+        let compared = (*comparison, [left, right]);
+        self.static_facts
+            .spans_of_comparison(self.task, compared, truth)
+    }
+
+    /// Returns `true` unless the condition is a comparison of which a side never has a value.
+    fn has_values(&self, condition: &Condition) -> bool {
+        let Condition::Compare(_, left, right) = condition else {
+            return true;
+        };
+        let is_undefined = |side| self.static_facts.value(self.task, side) == Value::Undefined;
+        ![left, right].into_iter().any(is_undefined)
     }
 
     /// Returns `true` if a condition mentions facts that are true only at some times, by timed
@@ -153,15 +164,22 @@ impl EarliestTimes<'_> {
         match condition {
             Condition::Fact(fact) => {
                 let fact = self.task.atom(*fact);
-                let lasts = |spans: &[Span]| spans.last().is_some_and(|span| span.1.is_none());
                 let spans = self.static_facts.spans(&fact);
-                spans.map_or_else(|| self.reached.contains_key(&fact), lasts)
+                spans.map_or_else(|| self.reached.contains_key(&fact), holds_at_end)
             }
             Condition::And(parts) => parts.iter().all(|part| self.can_hold_at_end(part)),
             Condition::Or(parts) => parts.iter().any(|part| self.can_hold_at_end(part)),
-            Condition::Compare(..) | Condition::Not(_) => self
-                .next(condition, self.now, ConditionContext::All)
-                .is_some(),
+            Condition::Compare(..) | Condition::Not(_) => {
+                let spans = match condition {
+                    Condition::Not(part) => self.spans_of_comparison(part, false),
+                    _ => self.spans_of_comparison(condition, true),
+                };
+                let can_hold = || {
+                    self.next(condition, self.now, ConditionContext::All)
+                        .is_some()
+                };
+                spans.map_or_else(can_hold, |spans| holds_at_end(&spans))
+            }
         }
     }
 
@@ -257,4 +275,20 @@ impl EarliestTimes<'_> {
         let is_possible = most.as_ref().is_none_or(|most| least <= *most);
         is_possible.then_some((least, most))
     }
+}
+
+/// Returns the earliest time, not before `time`, from which an interval of this length lies in one of the spans.
+fn first_fit(spans: &[Span], time: &Rational, length: &Rational) -> Option<Rational> {
+    spans.iter().find_map(|(from, until)| {
+        let least = Rational::max(from.clone(), time.clone());
+        let end = &least + length;
+        until
+            .as_ref()
+            .is_none_or(|until| end <= *until)
+            .then_some(least)
+    })
+}
+
+fn holds_at_end(spans: &[Span]) -> bool {
+    spans.last().is_some_and(|span| span.1.is_none())
 }

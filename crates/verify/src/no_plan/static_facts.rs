@@ -1,5 +1,5 @@
-//! Permanent information from the problem itself: facts that only timed initials change, and
-//! numbers that nothing changes.
+//! Permanent information from the problem itself: facts and numbers that only timed initials change, or
+//! nothing.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,6 +10,7 @@ use elbowroom_num::Rational;
 
 use super::Fact;
 use super::initial_state::InitialState;
+use super::timed_numbers::TimedNumbers;
 
 /// Interval during which a fact may be true; an end of `None` is never.
 pub(super) type Span = (Rational, Option<Rational>);
@@ -23,6 +24,10 @@ pub(super) struct StaticFacts {
     can_become_false: BTreeSet<PredicateId>,
     /// Functions whose values change.
     changing: BTreeSet<FunctionId>,
+    /// The functions among them whose values actions change.
+    changed_by_actions: BTreeSet<FunctionId>,
+    /// Values that timed initials assign.
+    pub(super) numbers: TimedNumbers,
     /// Functions that some effect or timed initial assigns a value.
     assigned: BTreeSet<FunctionId>,
     /// Intervals of the facts that only timed initials make true. Other facts of these predicates
@@ -40,6 +45,8 @@ impl StaticFacts {
             can_become_true: BTreeSet::new(),
             can_become_false: BTreeSet::new(),
             changing: BTreeSet::new(),
+            changed_by_actions: BTreeSet::new(),
+            numbers: TimedNumbers::of(beginning),
             assigned: BTreeSet::new(),
             spans: BTreeMap::new(),
             assumes_values: false,
@@ -65,6 +72,7 @@ impl StaticFacts {
             lasting.can_become_true.insert(rule.predicate);
             lasting.can_become_false.insert(rule.predicate);
         }
+        lasting.changed_by_actions = lasting.changing.clone();
         lasting.follow_timed(task, beginning);
         lasting
     }
@@ -139,6 +147,11 @@ impl StaticFacts {
     /// Returns `true` if only timed initials make facts of the predicate true.
     pub(super) fn is_fixed(&self, predicate: PredicateId) -> bool {
         !self.can_become_true.contains(&predicate)
+    }
+
+    /// Returns `true` if an action may change a fluent of the function.
+    pub(super) fn is_changed_by_actions(&self, function: FunctionId) -> bool {
+        self.changed_by_actions.contains(&function)
     }
 
     /// Returns `true` if some fluent of the function is assigned a value.

@@ -264,6 +264,23 @@ fn plans_enabled_by_rules_quantifiers_or_numbers_are_not_denied() {
             "(:init (light) (at 2 (not (light))) (at 3 (light)) (at 10 (not (light))))
              (:goal (seen))",
         ),
+        // A number that timed initials change, which the goal and the action read.
+        (
+            "(:requirements :durative-actions :timed-initial-literals :numeric-fluents)
+             (:predicates (seen)) (:functions (seeing))
+             (:durative-action look :parameters () :duration (= ?duration 6)
+               :condition (over all (<= (seeing) 2)) :effect (at end (seen)))",
+            "(:init (= (seeing) 4) (at 2 (= (seeing) 1)) (at 5 (= (seeing) 2)) (at 9 (= (seeing) 9)))
+             (:goal (and (seen) (>= (seeing) 9)))",
+        ),
+        // A number that timed initials and an action change.
+        (
+            "(:requirements :durative-actions :timed-initial-literals :numeric-fluents)
+             (:predicates (seen)) (:functions (seeing))
+             (:durative-action heat :parameters () :duration (= ?duration 6)
+               :condition () :effect (at end (increase (seeing) 5)))",
+            "(:init (= (seeing) 1) (at 2 (= (seeing) 4))) (:goal (>= (seeing) 9))",
+        ),
     ];
     for (domain, problem) in solvable {
         let task = task(domain, problem);
@@ -275,4 +292,106 @@ fn plans_enabled_by_rules_quantifiers_or_numbers_are_not_denied() {
             assert!(verify_no_plan(&task, &own).is_err(), "{own:?}");
         }
     }
+}
+
+#[test]
+fn number_that_timed_initials_never_raise_enough_is_a_proof() {
+    let domain = "(:requirements :durative-actions :timed-initial-literals :numeric-fluents)
+        (:predicates (seen)) (:functions (seeing) (limit))
+        (:durative-action look :parameters () :duration (= ?duration 6)
+          :condition (over all (<= (seeing) (limit))) :effect (at end (seen)))";
+    let init = "(= (seeing) 4) (= (limit) 2) (at 2 (= (seeing) 1)) (at 5 (= (seeing) 3)) (at 20 (= (seeing) 4))";
+    let is_denied = |goal: &str, init: &str| {
+        let task = task(domain, &format!("(:init {init}) (:goal {goal})"));
+        let certificate = no_plan_certificate(&task, &listed(&task));
+        let is_proof = verify_no_plan(&task, &certificate).is_ok();
+        assert!(!is_proof || !has_plan(&task), "{goal}");
+        is_proof
+    };
+    assert!(is_denied("(>= (seeing) 9)", init));
+    assert!(is_denied("(not (< (seeing) 9))", init));
+    // It holds only before the last timed initial.
+    assert!(is_denied("(= (seeing) 3)", init));
+    assert!(!is_denied("(= (seeing) 4)", init));
+    assert!(!is_denied("(not (= (seeing) 3))", init));
+    // The seeing is good enough for 3, and for 15 with another limit.
+    assert!(is_denied("(seen)", init));
+    assert!(!is_denied(
+        "(seen)",
+        &init.replace("(limit) 2", "(limit) 3")
+    ));
+    // It has no value first.
+    assert!(!is_denied(
+        "(seen)",
+        &init
+            .replace("(= (seeing) 4) (= (limit)", "(= (limit)")
+            .replace("(limit) 2", "(limit) 3")
+    ));
+}
+
+/// Returns a random problem about a number that timed initials change.
+fn numeric_problem(random: &mut Random) -> Task {
+    let compare = |random: &mut Random| {
+        let comparison = ["<", "<=", "=", ">=", ">"][random.below(5)];
+        let text = format!("({comparison} (x) {})", random.below(6));
+        if random.below(4) == 0 {
+            format!("(not {text})")
+        } else {
+            text
+        }
+    };
+    let mut domain = "(:requirements :durative-actions :timed-initial-literals :numeric-fluents
+        :negative-preconditions) (:predicates (f0) (f1)) (:functions (x))"
+        .to_owned();
+    for number in 0..2 {
+        let duration = random.below(4);
+        let when = ["at start", "over all", "at end"][random.below(3)];
+        let condition = compare(random);
+        let changes = random.below(12) == 0;
+        let change = if changes {
+            "(at end (increase (x) 1))"
+        } else {
+            ""
+        };
+        let other = if number == 1 { "(at start (f0))" } else { "" };
+        domain += &format!(
+            "(:durative-action a{number} :parameters () :duration (= ?duration {duration})
+              :condition (and ({when} {condition}) {other})
+              :effect (and (at end (f{number})) {change}))"
+        );
+    }
+    let (mut init, mut time) = (String::new(), 0);
+    if random.below(4) > 0 {
+        init += &format!("(= (x) {})", random.below(6));
+    }
+    for _ in 0..random.below(4) {
+        time += 1 + random.below(4);
+        init += &format!("(at {time} (= (x) {}))", random.below(6));
+    }
+    let fact = ["", "(f0)", "(f1)"][random.below(3)];
+    let number = if random.below(2) == 0 {
+        compare(random)
+    } else {
+        String::new()
+    };
+    task(
+        &domain,
+        &format!("(:init {init}) (:goal (and {fact} {number}))"),
+    )
+}
+
+#[test]
+fn proof_by_timed_numbers_agrees_with_planner() {
+    let mut random = Random(41);
+    let (mut denied, mut solved) = (0, 0);
+    for _ in 0..600 {
+        let task = numeric_problem(&mut random);
+        let certificate = no_plan_certificate(&task, &listed(&task));
+        let is_denied = verify_no_plan(&task, &certificate).is_ok();
+        let is_solved = has_plan(&task);
+        assert!(!(is_denied && is_solved), "{certificate:?}");
+        denied += usize::from(is_denied);
+        solved += usize::from(is_solved);
+    }
+    assert!(denied > 100 && solved > 100, "{denied} {solved}");
 }
