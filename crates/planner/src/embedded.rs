@@ -27,6 +27,7 @@ mod deadline_explanation;
 mod end_windows;
 mod expressions;
 mod extract;
+mod final_numbers;
 mod formula;
 mod h2;
 mod hash;
@@ -206,7 +207,7 @@ fn search_once(
     };
     progress.counts.actions = grounding.actions.len() as u64;
     work::spend(ACTION_WORK.saturating_mul(progress.counts.actions));
-    if let Some(proof) = unreachable(grounded, &grounding) {
+    if let Some(proof) = unreachable(grounded, &grounding, situation) {
         return Answer::Unsolvable {
             proof,
             counts: progress.counts,
@@ -267,13 +268,15 @@ fn search_once(
     Planner::new(frame, (&names, &symmetry), progress, observe).run()
 }
 
-fn unreachable(task: &Task, grounding: &Grounding) -> Option<Proof> {
-    if grounding.unreachable_goals.is_empty() && !grounding.goal.is_contradiction() {
-        return None;
-    }
-    let reasons = grounding
-        .unreachable_goals
-        .iter()
-        .map(|goal| format!("`{}` cannot become true", task.describe_condition(goal)));
-    Some(Proof::Unreachable(reasons.collect()))
+fn unreachable(task: &Task, grounding: &Grounding, situation: &Situation) -> Option<Proof> {
+    let unreachable = grounding.unreachable_goals.iter();
+    let unreachable = unreachable.map(|goal| (goal, "cannot become true"));
+    let is_false = final_numbers::false_comparisons(task, grounding, situation).into_iter();
+    let is_false = is_false.map(|goal| (goal, "is false after all timed initials in every plan"));
+    let reasons: Vec<_> = unreachable
+        .chain(is_false)
+        .map(|(goal, why)| format!("`{}` {why}", task.describe_condition(goal)))
+        .collect();
+    let is_proof = !reasons.is_empty() || grounding.goal.is_contradiction();
+    is_proof.then_some(Proof::Unreachable(reasons))
 }

@@ -44,6 +44,7 @@ pub(crate) use calendars::{Calendar, Dates, spans};
 pub(crate) use initial_state::InitialState;
 pub(crate) use macros::Macro;
 pub(crate) use metric::Metric;
+pub(super) use reads::visit_changes;
 pub use unsupported::Unsupported;
 
 use super::formula::{Formula, Numeric, Test};

@@ -32,7 +32,7 @@ pub(super) fn read_action(symbols: &mut Symbols, action: &ground::Action) {
 }
 
 /// Calls `visit` for each numeric effect of the action.
-pub(super) fn visit_changes(
+pub(in crate::embedded) fn visit_changes(
     action: &ground::Action,
     visit: &mut impl FnMut(ground::FluentId, &ground::Expression),
 ) {

@@ -2,6 +2,7 @@
 
 use elbowroom_model::validate::{Settings as Strictness, Verdict};
 use elbowroom_model::{Situation, validate_from};
+use elbowroom_planner::Answer;
 use proptest::prelude::*;
 
 use crate::embedded::world::{answer, answer_from, describe, makespan, task};
@@ -118,6 +119,38 @@ fn water_that_never_is_deep_enough_is_no_plan() {
         (at 8 (= (depth y) 2)))";
     let answer = answer(TIDES, &format!("{init} (:goal (at b y))"));
     assert!(answer.found().is_none(), "{}", describe(&answer));
+}
+
+/// A telescope needs good seeing, which only timed initials change, or a heater.
+const TELESCOPE: &str = "(:requirements :durative-actions :numeric-fluents
+        :timed-initial-literals)
+    (:predicates (seen) (warm)) (:functions (seeing))
+    (:durative-action look :parameters () :duration (= ?duration 6)
+      :condition (over all (<= (seeing) 2)) :effect (at end (seen)))";
+
+#[test]
+fn goal_on_a_timed_fluent_that_is_never_reached_is_denied_at_once() {
+    let init = "(:init (= (seeing) 1) (at 10 (= (seeing) 4)) (at 20 (= (seeing) 3)))";
+    let heater = "(:durative-action heat :parameters () :duration (= ?duration 6)
+      :condition () :effect (at end (increase (seeing) 6)))";
+    let with_goal =
+        |domain: &str, goal: &str| answer(domain, &format!("{init} (:goal (and (seen) {goal}))"));
+    for goal in ["(>= (seeing) 9)", "(= (seeing) 4)"] {
+        let answer = with_goal(TELESCOPE, goal);
+        let Answer::Unsolvable { proof, counts } = &answer else {
+            panic!("{}", describe(&answer));
+        };
+        assert_eq!(counts.evaluated, 0);
+        let why = format!("`{goal}` is false after all timed initials in every plan");
+        assert_eq!(proof.to_string(), format!("no plan exists: {why}"));
+    }
+    for (domain, goal) in [
+        (TELESCOPE.to_owned(), "(= (seeing) 3)"),
+        (format!("{TELESCOPE}{heater}"), "(>= (seeing) 9)"),
+    ] {
+        let answer = with_goal(&domain, goal);
+        assert!(answer.found().is_some(), "{}", describe(&answer));
+    }
 }
 
 proptest! {
