@@ -171,34 +171,59 @@ impl Network {
     }
 
     /// Propagates the change along the edges only, without the windows.
+    ///
+    /// Edges are in the order of happenings, so that few rounds over all of them are needed. A depth-first
+    /// propagation would visit a node once for each path to it.
     fn follow_edges(
         &mut self,
         node: NodeId,
         time: Ticks,
         origin: NodeId,
     ) -> Result<(), Inconsistent> {
-        let mut waiting = vec![(node, time)];
-        while let Some((node, time)) = waiting.pop() {
-            let place = &mut self.nodes[node as usize];
-            if time <= place.earliest {
-                continue;
+        let mut raised = Vec::new();
+        let mut has_changed = self.raise(node, time, origin, &mut raised)?;
+        while has_changed {
+            has_changed = false;
+            for place in 0..self.edges.len() {
+                let Edge { from, to, distance } = self.edges[place];
+                let time = self.earliest(from) + distance;
+                has_changed |= self.raise(to, time, origin, &mut raised)?;
             }
-            if time > place.latest || node == origin {
-                return Err(Inconsistent);
-            }
-            place.earliest = time;
-            for edge in self.edges.iter().filter(|edge| edge.from == node) {
-                waiting.push((edge.to, time + edge.distance));
-            }
-            if (node as usize) < self.closed {
-                for (to, &distance) in (0..).zip(self.row(node)) {
-                    if distance > -NEVER && to != node {
-                        waiting.push((to, time + distance));
+            while let Some(from) = raised.pop() {
+                for to in 0..self.closed {
+                    let distance = self.matrix[from as usize * self.closed + to];
+                    if distance > -NEVER {
+                        let time = self.earliest(from) + distance;
+                        let to = NodeId::try_from(to).unwrap_or(SETTLED);
+                        has_changed |= self.raise(to, time, origin, &mut raised)?;
                     }
                 }
             }
         }
         Ok(())
+    }
+
+    /// Raises the earliest time of one node, and records it in `raised` if it has a row in the matrix. Returns
+    /// `true` if the time has changed.
+    fn raise(
+        &mut self,
+        node: NodeId,
+        time: Ticks,
+        origin: NodeId,
+        raised: &mut Vec<NodeId>,
+    ) -> Result<bool, Inconsistent> {
+        let place = &mut self.nodes[node as usize];
+        if time <= place.earliest {
+            return Ok(false);
+        }
+        if time > place.latest || node == origin {
+            return Err(Inconsistent);
+        }
+        place.earliest = time;
+        if (node as usize) < self.closed {
+            raised.push(node);
+        }
+        Ok(true)
     }
 
     /// Raises the lower bound of a node to `time`.

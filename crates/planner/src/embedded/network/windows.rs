@@ -18,15 +18,17 @@ impl Network {
     /// Moves nodes to their next windows until each is in one. Each move is to a later interval, so
     /// the loop terminates.
     pub(super) fn enter_windows(&mut self) -> Result<(), Inconsistent> {
-        let mut place = 0;
-        while place < self.within.len() {
-            let within = self.within[place];
-            let (interval, _) = self.interval_of(within).ok_or(Inconsistent)?;
-            place += 1;
-            if self.earliest(within.first) < interval.0 {
-                self.follow_edges(within.first, interval.0, SETTLED)?;
-                // The move may have pushed other nodes out of their windows.
-                place = 0;
+        let mut has_moved = true;
+        while has_moved {
+            has_moved = false;
+            for place in 0..self.within.len() {
+                let within = self.within[place];
+                let (interval, _) = self.interval_of(within).ok_or(Inconsistent)?;
+                if self.earliest(within.first) < interval.0 {
+                    // The move may push other nodes out of their windows.
+                    self.follow_edges(within.first, interval.0, SETTLED)?;
+                    has_moved = true;
+                }
             }
         }
         Ok(())

@@ -3,6 +3,9 @@
 //! The search uses ticks, to which all fixed times are rounded down. The times of a plan are
 //! computed exactly.
 
+use std::cell::RefCell;
+use std::rc::Rc;
+
 use elbowroom_model::problem::Comparison;
 use elbowroom_num::simplex::{Optimum, Simplex, VariableId};
 use elbowroom_num::{Delta, Rational};
@@ -128,11 +131,7 @@ pub(crate) fn is_possible(
     if !symbolic.has_demands() && limit.is_none() {
         return true;
     }
-    let constraints = Constraints {
-        symbolic,
-        compiled,
-        limit: limit.as_ref(),
-    };
+    let constraints = Constraints::new(symbolic, compiled, limit.as_ref());
     let Some(times) = windows::place(&mut state.network, &constraints) else {
         return false;
     };
@@ -147,9 +146,34 @@ pub(super) struct Constraints<'a> {
     pub(super) symbolic: &'a Symbolic,
     pub(super) compiled: &'a Compiled,
     pub(super) limit: Option<&'a Limit<'a>>,
+    /// The known distances from a node to all others. All networks of these constraints have the same edges, and
+    /// differ in the bounds of nodes.
+    distances: RefCell<Vec<Option<Rc<[Ticks]>>>>,
 }
 
-impl Constraints<'_> {
+impl<'a> Constraints<'a> {
+    pub(super) fn new(
+        symbolic: &'a Symbolic,
+        compiled: &'a Compiled,
+        limit: Option<&'a Limit<'a>>,
+    ) -> Self {
+        Self {
+            symbolic,
+            compiled,
+            limit,
+            distances: RefCell::default(),
+        }
+    }
+
+    /// Returns the minimum distance of each node after `origin`.
+    pub(super) fn distances_from(&self, network: &Network, origin: NodeId) -> Rc<[Ticks]> {
+        let mut known = self.distances.borrow_mut();
+        known.resize(network.node_count(), None);
+        let row =
+            known[usize::from(origin)].get_or_insert_with(|| network.distances_from(origin).into());
+        Rc::clone(row)
+    }
+
     /// Returns times of the happenings in the demands, and of `others`, that extend to times of all
     /// happenings, and satisfy all constraints. Returns `None` if there are none.
     pub(super) fn times(
@@ -226,11 +250,7 @@ fn earliest_times(
 /// numbers. The metric is minimal, and then the last happening is as early as possible.
 pub(crate) fn solve(state: &State, compiled: &Compiled, exact: &Exact) -> Option<Vec<Rational>> {
     let symbolic = state.symbolic.as_ref()?;
-    let constraints = Constraints {
-        symbolic,
-        compiled,
-        limit: None,
-    };
+    let constraints = Constraints::new(symbolic, compiled, None);
     let (mut program, times, end) =
         program(&state.network, &symbolic.demands, compiled, Some(exact));
     for (node, bounds) in windows::node_bounds(&state.network, &constraints)? {

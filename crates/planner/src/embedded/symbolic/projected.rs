@@ -38,12 +38,14 @@ struct Projected {
 pub(super) fn times(
     network: &Network,
     others: &[NodeId],
-    Constraints {
+    constraints: &Constraints<'_>,
+) -> Option<Vec<(NodeId, Rational)>> {
+    let &Constraints {
         symbolic,
         compiled,
         limit,
-    }: &Constraints<'_>,
-) -> Option<Vec<(NodeId, Rational)>> {
+        ..
+    } = constraints;
     let forms = symbolic.demands.iter().map(|demand| &demand.0);
     let forms = forms.chain(limit.map(|limit| &limit.spent));
     let mut nodes: Vec<NodeId> = forms
@@ -52,7 +54,7 @@ pub(super) fn times(
         .collect();
     nodes.sort_unstable();
     nodes.dedup();
-    let projected = Projected::of(network, nodes, compiled.scale);
+    let projected = Projected::of(network, nodes, constraints);
     let is_met = |times: &[Rational]| {
         let demands = &mut symbolic.demands.iter();
         demands.all(|(form, comparison)| {
@@ -74,14 +76,14 @@ pub(super) fn times(
         if is_met(&times) && projected.allows(&times) {
             times
         } else {
-            projected.solve(&symbolic.demands, *limit)?
+            projected.solve(&symbolic.demands, limit)?
         }
     };
     Some(projected.nodes.into_iter().zip(times).collect())
 }
 
 impl Projected {
-    fn of(network: &Network, nodes: Vec<NodeId>, scale: Scale) -> Self {
+    fn of(network: &Network, nodes: Vec<NodeId>, constraints: &Constraints<'_>) -> Self {
         let mut projected = Self {
             earliest: nodes.iter().map(|&node| network.earliest(node)).collect(),
             latest: Vec::with_capacity(nodes.len()),
@@ -89,10 +91,10 @@ impl Projected {
             end: network.earliest_end(),
             distances: Vec::with_capacity(nodes.len() * nodes.len()),
             nodes,
-            scale,
+            scale: constraints.compiled.scale,
         };
         for &node in &projected.nodes {
-            let row = network.distances_from(node);
+            let row = constraints.distances_from(network, node);
             projected.latest.push(network.latest_given(&row));
             let tail = row.iter().copied().max().unwrap_or(0);
             projected.tails.push(tail.max(0));

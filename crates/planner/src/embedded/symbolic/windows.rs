@@ -5,7 +5,8 @@
 //! linear program decides between windows by diving, as in integer programming: its relaxation
 //! allows all times from the first window of a happening to the last one. If the solution places a
 //! happening in a gap between two windows, it has to be before the gap, or after it if the
-//! relaxation then has no solution. Decisions are not revised.
+//! relaxation then has no solution. Decisions are not revised. Before each decision, the happenings in the demands
+//! move to a solution without windows, and all others to the next windows; most demands can be satisfied there.
 
 use elbowroom_num::Rational;
 
@@ -74,7 +75,10 @@ fn select(mut network: Network, constraints: &Constraints<'_>) -> Option<Placeme
         }
         let (relaxed, nodes) = relaxation(&network, &intervals);
         // Most states without times are detected without the happenings in windows.
-        constraints.times(&relaxed, &[])?;
+        let times = constraints.times(&relaxed, &[])?;
+        if let Some(placement) = place_later(&network, &times, constraints) {
+            return Some(placement);
+        }
         let times = constraints.times(&relaxed, &nodes)?;
         let gap = match selected_intervals(&network, &intervals, constraints, &times) {
             Ok(intervals) => return Some(Placement { times, intervals }),
@@ -86,6 +90,27 @@ fn select(mut network: Network, constraints: &Constraints<'_>) -> Option<Placeme
         }
     }
     None
+}
+
+/// Selects the earliest intervals for which the happenings in the demands are no earlier than in `times`, if some
+/// times in these intervals satisfy the demands.
+fn place_later(
+    network: &Network,
+    times: &[(NodeId, Rational)],
+    constraints: &Constraints<'_>,
+) -> Option<Placement> {
+    let mut later = network.clone();
+    for (node, time) in times {
+        let time = constraints.compiled.scale.ceil(time).0;
+        later.raise_earliest(*node, time).ok()?;
+    }
+    let intervals = current_intervals(&later)?;
+    let mut selected = network.clone();
+    for (within, (begin, _)) in network.within().iter().zip(&intervals) {
+        selected.raise_earliest(within.first, *begin).ok()?;
+    }
+    let times = constraints.times(&selected.in_intervals(&intervals), &[])?;
+    Some(Placement { times, intervals })
 }
 
 /// Returns the network with the happenings before the gap, if the relaxed problem then has times.

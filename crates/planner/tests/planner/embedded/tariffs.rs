@@ -209,7 +209,7 @@ fn answer_with(task: &Task, as_calendars: bool) -> Answer {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 300, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 100, ..ProptestConfig::default() })]
 
     #[test]
     fn best_cost_with_calendars_is_the_best_one_with_choices(draft in drafts()) {

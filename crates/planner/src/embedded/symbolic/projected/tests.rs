@@ -135,7 +135,7 @@ proptest! {
             let spent = form(&compiled, count, &weights, 0);
             let limit = Limit { spent, time: Rational::from(time), bound: &bound };
             let limit = is_limited.then_some(&limit);
-            let constraints = Constraints { symbolic: &symbolic, compiled: &compiled, limit };
+            let constraints = Constraints::new(&symbolic, &compiled, limit);
             let found = times(&network, &[], &constraints);
             let expected = all_times(&network, &symbolic.demands, &compiled, limit);
             prop_assert_eq!(found.is_some(), expected.is_some());
