@@ -114,7 +114,7 @@ impl EarliestTimes<'_> {
             .spans_of_comparison(self.task, compared, truth)
     }
 
-    /// Returns `true` unless the condition is a comparison of which a side never has a value.
+    /// Returns `true` unless the condition is a comparison with a side that never has a value.
     fn has_values(&self, condition: &Condition) -> bool {
         let Condition::Compare(_, left, right) = condition else {
             return true;
@@ -277,7 +277,7 @@ impl EarliestTimes<'_> {
     }
 }
 
-/// Returns the earliest time, not before `time`, from which an interval of this length lies in one of the spans.
+/// Returns the earliest start, not before `time`, of an interval of this length in one of the spans.
 fn first_fit(spans: &[Span], time: &Rational, length: &Rational) -> Option<Rational> {
     spans.iter().find_map(|(from, until)| {
         let least = Rational::max(from.clone(), time.clone());

@@ -4,6 +4,7 @@
 
 #![allow(
     clippy::unwrap_used,
+    clippy::format_push_string,
     dead_code,
     reason = "the helpers of a test are part of it, and the random numbers have more for others"
 )]
