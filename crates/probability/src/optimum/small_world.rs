@@ -47,6 +47,10 @@ impl PolicyTable {
         let task = task.clone();
         let likelihoods = without_luck(likelihoods);
         let actions = all_actions_under(&task, &likelihoods).ok()?;
+        // The checks below compare all pairs of actions, which takes long in large worlds.
+        if sets(actions.len()) > MAX_STATES {
+            return None;
+        }
         let failures = |action: &Action| likelihoods.failure_changes(&task, action);
         if ends_break_others(&actions, task.goal(), failures)
             || ends_await_others(&actions, failures)
