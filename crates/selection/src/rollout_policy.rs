@@ -224,7 +224,6 @@ impl RolloutEvaluator for RolloutPolicy {
     fn evaluate(&mut self, scene: &DecisionPoint<'_>) -> RolloutResult {
         self.chosen = None;
         self.set_goal(scene.belief.task().goal());
-        let ways = self.alternatives_with_current_plan(scene);
         let is_beginning = scene.is_plan_new && scene.belief.time().is_zero();
         let steps = scene.remaining_steps.to_vec();
         let plan = TimeTriggeredPlan { steps };
@@ -234,9 +233,14 @@ impl RolloutEvaluator for RolloutPolicy {
             .find(|(known, _)| *known == plan);
         if let Some((_, choice)) = known.filter(|_| is_beginning) {
             let choice = choice.clone();
+            let ways = if choice.alternative == 0 {
+                vec![Alternative::Unchanged]
+            } else {
+                self.alternatives_with_current_plan(scene)
+            };
             return self.result_of(ways, &choice);
         }
-        let (ways, choice) = self.choose(scene, ways);
+        let (ways, choice) = self.choose(scene);
         if is_beginning {
             self.initial_results.push((plan, choice.clone()));
         }
@@ -414,16 +418,14 @@ impl RolloutPolicy {
         plans.take(MAX_PLANS).map(|it| it.plan).collect()
     }
 
-    fn choose(
-        &mut self,
-        scene: &DecisionPoint<'_>,
-        mut ways: Vec<Alternative>,
-    ) -> (Vec<Alternative>, Choice) {
+    /// Returns the alternatives, and the choice among them. Alternatives to the executor's decision
+    /// are prepared only if its first samples fail.
+    fn choose(&mut self, scene: &DecisionPoint<'_>) -> (Vec<Alternative>, Choice) {
         let budget = work::Budget::new(self.planner.work);
         let mut stage = SampleSet::new(scene, &self.rollouts);
         let mut first = Vec::new();
         for sample in 0..FIRST_SAMPLES {
-            first.push(stage.succeeds(self, scene, &ways[0], sample));
+            first.push(stage.succeeds(self, scene, &Alternative::Unchanged, sample));
             if budget.is_spent() {
                 break;
             }
@@ -442,8 +444,9 @@ impl RolloutPolicy {
                 current: share,
                 is_fine: true,
             };
-            return (ways, choice);
+            return (vec![Alternative::Unchanged], choice);
         }
+        let mut ways = self.alternatives_with_current_plan(scene);
         self.add_replanning_and_waiting(scene, &mut ways);
         let rules = if scene.is_plan_new {
             Rules {
