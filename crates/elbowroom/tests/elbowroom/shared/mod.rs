@@ -1,6 +1,6 @@
 //! Benchmark files next to the repository. Tests that need them print a note and pass if they are
 //! missing.
-#![allow(dead_code, reason = "each test uses some of it")]
+#![allow(dead_code, unused_imports, reason = "each test uses some of it")]
 
 pub(crate) mod case;
 pub(crate) mod chains;

@@ -281,20 +281,22 @@ fn replanning_during_a_known_drain_needs_few_states() {
     );
     let task = task(WATERING, &problem);
     let object = |name| task.problem().object(name).expect("as written");
-    let (tank, bed) = (object("t1"), object("b0"));
+    let (running, bed) = (object("t1"), object("b0"));
     let fact = |name, arguments: &[ObjectId]| {
         let predicate = task.problem().predicate(name).expect("as written");
         task.find_fact(predicate, arguments).expect("as written")
     };
     let schema = task.problem().schema("water").expect("as written");
-    let action = task.instantiate(schema, &[tank, bed]).expect("as written");
+    let action = task
+        .instantiate(schema, &[running, bed])
+        .expect("as written");
     let level = task.problem().function("level").expect("as written");
-    let level = task.find_fluent(level, &[tank]).expect("as written");
+    let level = task.find_fluent(level, &[running]).expect("as written");
     let mut situation = Situation::initial(&task);
     for gone in ["home", "ready"] {
-        situation.state.facts.remove(&fact(gone, &[tank]));
+        situation.state.facts.remove(&fact(gone, &[running]));
     }
-    situation.state.facts.insert(fact("at", &[tank, bed]));
+    situation.state.facts.insert(fact("at", &[running, bed]));
     situation.state.facts.insert(fact("open", &[bed]));
     situation.state.values.insert(level, 26.into());
     situation.time = 5.into();

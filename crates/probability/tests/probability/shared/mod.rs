@@ -1,6 +1,6 @@
 //! The authors' domains and likelihoods, and the first plans of the experiments. Tests that need
 //! files outside of the repository report if these are missing, and pass.
-#![allow(dead_code, reason = "each test uses some of it")]
+#![allow(dead_code, unused_imports, reason = "each test uses some of it")]
 
 #[path = "../../../../../testing/sampled.rs"]
 mod sampled;
