@@ -55,6 +55,7 @@ world.run()
 for (const [name, text] of Object.entries({ "patrol.pddl": domain, "patrol-day.pddl": problem, "patrol.py": world })) fs.writeFileSync(file(name), text);
 
 function served() {
+  fs.rmSync(file("long.trace"), { force: true });
   const child = spawn(elbowroom, ["serve", file("patrol.pddl"), file("patrol-day.pddl"), "--http", "0", "--trace", file("long.trace"),
     "--world-process", `python3 ${file("patrol.py")}`]);
   process.on("exit", () => child.kill("SIGKILL"));
@@ -74,6 +75,8 @@ function lineCounter() {
   const chunk = Buffer.alloc(1 << 20);
   let [position, lines] = [0, 0];
   return () => {
+    // The address is known before the trace is created.
+    if (!fs.existsSync(file("long.trace"))) return 0;
     const source = fs.openSync(file("long.trace"), "r");
     for (let read; (read = fs.readSync(source, chunk, 0, chunk.length, position)) > 0; position += read) {
       for (let at = chunk.indexOf(10); at >= 0 && at < read; at = chunk.indexOf(10, at + 1)) lines += 1;
