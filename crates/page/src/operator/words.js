@@ -7,11 +7,14 @@ function setText(node, text) {
   if (node.textContent !== text) node.textContent = text;
 }
 
-// A number with at most three decimal digits.
+// A number with at most three decimal digits, half rounded away from zero. `toFixed` alone rounds the binary number: 154.5065
+// to 154.506.
 function nearest(value) {
   if (typeof value !== "number") return value === undefined ? "" : String(value);
-  const text = value.toFixed(3).replace(/\.?0+$/, "");
-  return text === "-0" ? "0" : text;
+  const size = Math.abs(value);
+  const rounded = size >= 1e-6 && size < 1e15 ? Math.round(Number(`${size}e3`)) / 1e3 : size;
+  const text = rounded.toFixed(3).replace(/\.?0+$/, "");
+  return value < 0 && text !== "0" ? `-${text}` : text;
 }
 
 // Formats a duration that changes while it is displayed, with one decimal digit.
