@@ -4,6 +4,7 @@ mod ended;
 mod fork;
 mod goals;
 mod history;
+mod idle;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -11,8 +12,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use elbowroom::execution::run::{PROBLEM_GOAL_NAME, TimeoutRule, Verdict};
 use elbowroom::execution::{
     ActionHandle, BeliefState, Cause, Command, Decided, Decision, Doubt, Entry, Event, GoalTerms,
-    GuaranteeLevel, Observation, PreparedPlan, Reason, Request, StepId, UnreachedGoal,
-    WarningCause,
+    GuaranteeLevel, Observation, PreparedPlan, Request, StepId, WarningCause,
 };
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::model::{Situation, Task};
@@ -427,11 +427,7 @@ impl StatusData {
                     }
                     Some(verdict) => {
                         self.goals.mark_unplanned(unreached, now);
-                        let words = verdict_text(verdict);
-                        match why_idle(verdict, dead_end, unreached) {
-                            Some(why) => format!("{words}: {goals}: {why}"),
-                            None => format!("{words}: {goals}"),
-                        }
+                        idle::unreached(verdict, &goals, dead_end, unreached)
                     }
                 });
             }
@@ -624,40 +620,5 @@ impl StatusData {
             Request::Pause => self.is_paused = true,
             Request::Resume => self.is_paused = false,
         }
-    }
-}
-
-/// Returns the reasons for which an executive is idle without having reached its goals. Of several
-/// goals, each is named with its own reasons.
-fn why_idle(verdict: &Verdict, dead_end: &[Reason], unreached: &[UnreachedGoal]) -> Option<String> {
-    if unreached.len() < 2 {
-        let reasons = goals::joined(dead_end).into_iter();
-        let all: Vec<String> = verdict
-            .why()
-            .map(str::to_owned)
-            .into_iter()
-            .chain(reasons)
-            .collect();
-        return (!all.is_empty()).then(|| all.join("; "));
-    }
-    let words = unreached.iter().filter_map(|goal| {
-        let why = goals::joined(&goal.reasons)?;
-        let is_named = goal.reasons.iter().all(|it| it.cause == Cause::TooLate);
-        Some(if is_named {
-            why
-        } else {
-            format!("`{}`: {why}", goal.name)
-        })
-    });
-    Some(words.collect::<Vec<_>>().join("; "))
-}
-
-fn verdict_text(verdict: &Verdict) -> &'static str {
-    match verdict {
-        Verdict::Unsolvable => "no plan reaches the goals from here",
-        Verdict::NoPlan { .. } => "no plan was found",
-        Verdict::PlannerFailed { .. } => "the planner failed",
-        Verdict::ReplanLimit => "too many plans were abandoned",
-        other => other.name(),
     }
 }

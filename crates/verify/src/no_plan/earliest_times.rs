@@ -103,8 +103,8 @@ impl EarliestTimes<'_> {
         }
     }
 
-    /// Returns the intervals in which the condition may have this truth, if it is a comparison of numbers that
-    /// only timed initials change, or nothing.
+    /// Returns the intervals in which a comparison of numbers may be true (or false, if `truth` is). `None` for other
+    /// conditions, and for numbers that something other than timed initials changes.
     fn spans_of_comparison(&self, condition: &Condition, truth: bool) -> Option<Vec<Span>> {
         let Condition::Compare(comparison, left, right) = condition else {
             return None;

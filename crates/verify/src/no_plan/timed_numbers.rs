@@ -56,8 +56,8 @@ impl TimedNumbers {
 }
 
 impl StaticFacts {
-    /// Returns the intervals, with both ends, in which a comparison may have this truth. Returns `None` if it
-    /// reads a number that something other than timed initials changes, so that it may have any truth at any time.
+    /// Returns the closed intervals in which a comparison may be true, or false if `truth` is. Returns `None` if it
+    /// reads a number that something other than timed initials changes: it may then be true or false at any time.
     pub(super) fn spans_of_comparison(
         &self,
         task: &Task,
