@@ -160,6 +160,8 @@ pub struct ExecutorServices {
     pub action_values: Option<Arc<dyn ActionValues>>,
     /// Simulation of possible moves, if there are no action values: [`Needs::rollouts`].
     pub rollout: Option<Box<dyn RolloutEvaluator>>,
+    /// `true` if the run can make new plans.
+    pub has_planner: bool,
 }
 
 impl ExecutorServices {
@@ -174,7 +176,7 @@ impl ExecutorServices {
 }
 
 impl<R: RegionOracle + 'static> From<Box<R>> for ExecutorServices {
-    /// Creates means with certain outcomes, and without comparison of plans.
+    /// Creates means with certain outcomes, without new plans and without comparison of plans.
     fn from(region: Box<R>) -> Self {
         Self {
             region,
@@ -184,6 +186,7 @@ impl<R: RegionOracle + 'static> From<Box<R>> for ExecutorServices {
             order_cache: None,
             action_values: None,
             rollout: None,
+            has_planner: false,
         }
     }
 }

@@ -32,6 +32,11 @@ pub trait Planner: Send {
     /// Cancels the search that was begun.
     fn give_up(&mut self) {}
 
+    /// Returns `false` if it never makes a plan.
+    fn makes_plans(&self) -> bool {
+        true
+    }
+
     /// Returns `true` if the next answer is read from the record of a run. The planner must then be asked, even if the
     /// caller has a plan already: each request in the record has one answer.
     fn is_recorded(&self) -> bool {
@@ -46,6 +51,7 @@ forward_port!(Planner {
     fn collect(&mut self, task: &Task, situation: &Situation) -> Planned;
     fn give_up(&mut self);
 } ref {
+    fn makes_plans(&self) -> bool;
     fn is_recorded(&self) -> bool;
 });
 
@@ -178,5 +184,9 @@ pub struct NoPlanner;
 impl Planner for NoPlanner {
     fn plan(&mut self, _task: &Task, _situation: &Situation) -> Planned {
         Planned::from(PlanAnswer::NoPlanner)
+    }
+
+    fn makes_plans(&self) -> bool {
+        false
     }
 }

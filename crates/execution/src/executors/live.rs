@@ -2,6 +2,7 @@
 
 mod alternative;
 mod box_membership;
+mod early_starts;
 mod limits;
 mod repetition;
 mod without_guarantee;
@@ -52,6 +53,7 @@ pub(super) const REGISTERED: ExecutorEntry = ExecutorEntry {
         Box::new(Live {
             region: means.region,
             comparator: means.comparator.zip(advantage),
+            has_planner: means.has_planner,
             state: None,
             reduction: ReductionClass::Impossible,
             unguaranteed: None,
@@ -65,6 +67,8 @@ struct Live {
     region: Box<dyn RegionOracle>,
     /// The comparison of plans, and the advantage that another plan must have.
     comparator: Option<(Box<dyn PlanComparator>, Rational)>,
+    /// `true` if the run can make new plans.
+    has_planner: bool,
     state: Option<ExecutedPlan>,
     /// Reduction of the planned durations that the last abandoned plan needs to succeed.
     reduction: ReductionClass,
@@ -114,6 +118,7 @@ impl Executor for Live {
         let by_orderings = by_orderings.then(|| ExecutedPlan::begin_by_orderings(mission, region));
         let (rest, carried_on) = match by_orderings.flatten() {
             Some((rest, carried_on)) => (rest, Some(carried_on)),
+            None if self.has_planner => (ExecutedPlan::with_early_starts(mission, region)?, None),
             None => (ExecutedPlan::new(mission, region)?, None),
         };
         self.state = Some(rest);
@@ -197,6 +202,7 @@ impl Executor for Live {
         Some(Box::new(Self {
             region: self.region.fork()?,
             comparator: None,
+            has_planner: self.has_planner,
             state: self.state.clone(),
             reduction: self.reduction,
             unguaranteed: carried_on,

@@ -56,7 +56,7 @@ impl Run<'_> {
         has_planner
             && self.search_results.may_seek_better_plan()
             && self.settings.running == RunningRule::Keep
-            && self.replans.count() < self.settings.max_replans
+            && self.replans.remaining(self.settings.max_replans) > 0
             && !self.chooses_order()
             && !self.goals.is_change_pending()
             && !self.goals.is_paused()

@@ -245,7 +245,7 @@ impl Run<'_> {
         }
         self.search_results.note_infeasible_plan();
         self.agenda.push(PendingStep::Plan(reason.clone()));
-        if self.replans.count() == most {
+        if self.replans.remaining(most) == 0 {
             // The last permitted plan is not requested while overdue actions are running.
             let overdue = self.view().longer_than_planned();
             let doubts = self.belief.doubt_count();

@@ -315,6 +315,9 @@ impl Run<'_> {
             return None;
         }
         self.action_log.note_end(ticket, &time, ending, measured);
+        if *ending == Ending::Succeeded {
+            self.replans.note_progress();
+        }
         match step {
             Some(step) => self.plan_events.push(PlanEvent::Ended {
                 step,

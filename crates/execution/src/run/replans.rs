@@ -5,10 +5,16 @@ use crate::reason::Reason;
 /// Number of reasons that an executive keeps.
 const MAX_REASONS: usize = 1000;
 
+/// Greatest number of new plans, as a multiple of the permitted number without a completed action.
+/// It ends a run that completes actions for ever, but never reaches its goal.
+const MAX_ROUNDS: usize = 10;
+
 /// The new plans of a run; of an executive, since it was last idle.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Replans {
     count: usize,
+    /// The new plans since an action was last completed.
+    without_progress: usize,
     reasons: Vec<Reason>,
 }
 
@@ -16,7 +22,7 @@ impl Replans {
     pub(super) fn restored(count: usize) -> Self {
         Self {
             count,
-            reasons: Vec::new(),
+            ..Self::default()
         }
     }
 
@@ -24,13 +30,26 @@ impl Replans {
         self.count
     }
 
-    /// Counts a new plan. Returns `false` if there are `most` already; then it is not counted, but
-    /// its reason is kept.
+    /// Counts a new plan. Returns `false` if no more are permitted; then it is not counted, but its
+    /// reason is kept. `most` is the permitted number without a completed action.
     pub(super) fn try_count(&mut self, reason: &Reason, most: usize) -> bool {
         self.reasons.push(reason.clone());
-        let is_permitted = self.count < most;
+        let is_permitted = self.remaining(most) > 0;
         self.count += usize::from(is_permitted);
+        self.without_progress += usize::from(is_permitted);
         is_permitted
+    }
+
+    /// Returns how many new plans are permitted until an action is completed. See
+    /// [`try_count`](Self::try_count).
+    pub(super) fn remaining(&self, most: usize) -> usize {
+        let in_all = (MAX_ROUNDS * most).saturating_sub(self.count);
+        most.saturating_sub(self.without_progress).min(in_all)
+    }
+
+    /// Notes that an action was completed successfully.
+    pub(super) fn note_progress(&mut self) {
+        self.without_progress = 0;
     }
 
     /// Forgets the last reason, whose plan was not made.
@@ -40,6 +59,7 @@ impl Replans {
 
     pub(super) fn reset_count(&mut self) {
         self.count = 0;
+        self.without_progress = 0;
     }
 
     pub(super) fn forget_reasons(&mut self) {

@@ -20,7 +20,8 @@ pub struct RunSettings {
     pub running: RunningRule,
     /// The planning time in the world.
     pub planning_time: PlanningTime,
-    /// Maximum number of new plans.
+    /// Maximum number of new plans until an action is completed. A run makes at most ten times as
+    /// many.
     pub max_replans: usize,
     /// The rule that sets the time-out of each action.
     pub timeout: TimeoutRule,

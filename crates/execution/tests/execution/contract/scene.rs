@@ -73,6 +73,7 @@ impl Scene {
                 comparator: None,
                 policy_cache: PolicyTableCache::default(),
                 order_cache: self.orders.clone(),
+                has_planner: settings.max_replans > 0,
             }),
             recorder: Box::new(recorder),
         };
