@@ -75,6 +75,7 @@ fn row(executor: &str, robots: usize, actions: usize) {
         order_cache: None,
         action_values: None,
         rollout: None,
+        has_planner: false,
     });
     let begin = Instant::now();
     decider.adopt(&mission).expect("a plan with orders");

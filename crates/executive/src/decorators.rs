@@ -24,7 +24,7 @@ use std::sync::Arc;
 use elbowroom::execute::{Execution, RunInputs, SpecError};
 use elbowroom::execution::run::RunSnapshot;
 use elbowroom::execution::{BeliefState, Entry, Planner, Recorder, World};
-use elbowroom::model::Task;
+use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 use elbowroom::report::trace::Line;
 
@@ -57,16 +57,17 @@ impl<'a> Decorators<'a> {
         }
     }
 
-    /// Returns the execution of the inputs with this planner, decorated by [`Self::planner`] or a decorator of that.
+    /// Returns the execution of the inputs, which begins with the plan `first`, with this planner, decorated by [`Self::planner`] or a decorator of that.
     pub(crate) fn execution<'e>(
         &self,
+        first: Option<TimeTriggeredPlan>,
         planner: impl Planner + 'e,
         listener: impl FnMut(&BeliefState) + Send + 'e,
     ) -> Result<Execution<'e>, SpecError> {
         let preparer = BackgroundPreparer::new(self.inputs, &self.background.signal);
         Ok(self
             .inputs
-            .execution()?
+            .execution(first)?
             .with_planner(planner)
             .with_preparer(preparer)
             .on_belief(both(self.operator.listener(), listener)))

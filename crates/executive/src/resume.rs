@@ -244,8 +244,7 @@ impl InterruptedRun {
             let planner = Box::new(decorators.planner(&clock, &continues)?);
             let planner = ResumedPlanner::new(&stored, planner);
             let execution = decorators
-                .execution(planner, beliefs.listener())?
-                .beginning_with(first)
+                .execution(first, planner, beliefs.listener())?
                 .resume_from(stand)
                 .with_restarts(stored.restart_count() + usize::from(stored.is_complete()))
                 .recorded_by(&mut recorder);

@@ -257,10 +257,8 @@ impl<'a> RunAssembly<'a> {
         let clock = Clock::stopwatch();
         let continues = || !self.background.stop.is_requested();
         let planner = decorators.planner(&clock, &continues)?;
-        let execution = decorators.execution(planner, listener)?;
-        let execution = execution
-            .beginning_with(self.first_plan)
-            .recorded_by(recorder);
+        let execution = decorators.execution(self.first_plan, planner, listener)?;
+        let execution = execution.recorded_by(recorder);
         execute(self.inputs, execution, world, watcher)
     }
 
@@ -298,10 +296,8 @@ impl<'a> RunAssembly<'a> {
             clock: &world_clock,
             planning_time: &spec.planning_time,
         };
-        let execution = decorators.execution(planner, |_: &BeliefState| {})?;
-        let execution = execution
-            .beginning_with(self.first_plan)
-            .recorded_by(recorder);
+        let execution = decorators.execution(self.first_plan, planner, |_: &BeliefState| {})?;
+        let execution = execution.recorded_by(recorder);
         execute(self.inputs, execution, &mut world, watcher)
     }
 }

@@ -178,7 +178,7 @@ fn execute(
     let no_clock = || Rational::ZERO;
     let planner = inputs.planner(&no_clock, &may_continue)?;
     let execution = inputs
-        .execution()?
+        .execution(None)?
         .with_domain_commands(false)
         .resume_from(snapshot)
         .with_planner(planner)

@@ -148,6 +148,7 @@ fn rows(name: &str) {
                     order_cache: None,
                     action_values: spec.needs().action_values.then(|| Arc::clone(&policy)),
                     rollout: None,
+                    has_planner: false,
                 }),
                 times: times.clone(),
             };

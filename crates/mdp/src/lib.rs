@@ -156,7 +156,14 @@ pub fn has_known_times(task: &Task, model: &WorldModel) -> bool {
     world.is_ok_and(|world| discrete_events::cells(&world).is_some())
 }
 
-/// Returns `true` if the process supports all features of the task and of the world.
-pub fn is_supported(task: &Task, model: &WorldModel, settings: &Settings) -> bool {
-    TimedWorld::new(task, model, settings).is_ok()
+/// Checks whether the process supports all features of the task and of the world.
+///
+/// # Errors
+/// When it does not support one of them.
+pub fn check_support(
+    task: &Task,
+    model: &WorldModel,
+    settings: &Settings,
+) -> Result<(), NotTabulated> {
+    TimedWorld::new(task, model, settings).map(|_| ())
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use elbowroom_execution::executors::{self, Role};
 use elbowroom_execution::run::{PlanningTime, RunSettings};
-use elbowroom_mdp::Settings;
+use elbowroom_mdp::{NotTabulated, Settings};
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 use elbowroom_sim::WorldModel;
@@ -59,13 +59,7 @@ impl ActionSets {
         embedded: Embedded<'_>,
         may_continue: &(dyn Fn() -> bool + Sync),
     ) -> Self {
-        let is_of_use = |first: &[String]| {
-            let settings = Settings {
-                only: Some(first.to_vec()),
-                ..Settings::default()
-            };
-            elbowroom_mdp::is_supported(task, world, &settings)
-        };
+        let is_of_use = |first: &[String]| check_support(task, world, first.to_vec()).is_ok();
         Self::of(task, world, embedded, &is_of_use, may_continue)
     }
 
@@ -107,6 +101,22 @@ impl ActionSets {
         };
         Self { plans, fallbacks }
     }
+}
+
+/// Checks whether a table of some actions is possible.
+///
+/// # Errors
+/// When the process does not support them, or a feature of the world.
+pub(crate) fn check_support(
+    task: &Task,
+    world: &WorldModel,
+    actions: Vec<String>,
+) -> Result<(), NotTabulated> {
+    let settings = Settings {
+        only: Some(actions),
+        ..Settings::default()
+    };
+    elbowroom_mdp::check_support(task, world, &settings)
 }
 
 /// Returns [`ActionSets::fallbacks`], the most frequent first.
@@ -157,7 +167,7 @@ fn fallbacks(
 }
 
 /// Returns the names of a plan's actions.
-fn names(plan: &TimeTriggeredPlan) -> Vec<String> {
+pub(crate) fn names(plan: &TimeTriggeredPlan) -> Vec<String> {
     let steps = plan.steps.iter();
     steps.map(|step| step.action.name.clone()).collect()
 }

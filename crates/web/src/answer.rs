@@ -354,9 +354,8 @@ fn execute_plan(
     let written = writer.header(inputs.spec());
     written.map_err(|error| Failure::new(format!("cannot write the trace: {error}")))?;
     let execution = inputs
-        .execution()
+        .execution(first)
         .map_err(spec_error)?
-        .beginning_with(first)
         .recorded_by(&mut writer);
     let mut watcher = DeadlineObserver::start(clock, None);
     let outcome = simulate(&inputs, execution, &mut watcher).map_err(spec_error)?;

@@ -168,7 +168,8 @@ pub(crate) struct RunArgs {
     #[arg(long, value_name = "RULE", value_parser = timeout, default_value_t)]
     #[arg(hide_default_value = true, allow_negative_numbers = true)]
     pub(crate) timeout: TimeoutRule,
-    /// Number of new plans that may be made
+    /// Number of new plans that may be made until an action is completed; a run makes at most ten
+    /// times as many
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = count)]
     #[arg(allow_negative_numbers = true)]
     pub(crate) max_replans: usize,

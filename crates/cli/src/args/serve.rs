@@ -22,7 +22,7 @@ its requests.")]
     .default_value("1000000000")
     .help("Time limit of the executive, in seconds of the world; by default 30 years")))]
 #[command(mut_arg("max_replans", |it| it
-    .help("Number of new plans that may be made before the executive is idle and waits for a change")))]
+    .help("Number of new plans that may be made until an action is completed; then the executive waits for a change")))]
 #[command(mut_arg("realtime", |it| it
     .help("Run a simulated world FACTOR times as fast as the wall clock (0.000001 to 1000000000); \
            by default 1. A world process has a clock of its own")))]

@@ -173,7 +173,7 @@ pub struct RunSpec {
     /// planned duration, at least 600 seconds.
     #[serde(default, with = "as_text")]
     pub timeout: TimeoutRule,
-    /// Maximum number of new plans.
+    /// Maximum number of new plans until an action is completed ([`RunSettings::max_replans`]).
     pub max_replans: usize,
     /// Time limit of the run, in the world's seconds.
     #[serde(with = "positive")]

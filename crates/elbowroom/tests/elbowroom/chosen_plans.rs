@@ -295,7 +295,7 @@ impl Recorder for First {
 fn first_plan_of_a_run(spec: &RunSpec) -> (Vec<String>, Option<String>) {
     let (inputs, _) = RunInputs::read(spec.clone()).unwrap();
     let first = First::default();
-    let execution = inputs.execution().unwrap().recorded_by(first.clone());
+    let execution = inputs.execution(None).unwrap().recorded_by(first.clone());
     let outcome = simulate(&inputs, execution, &mut NoObserver).unwrap();
     let first = first.0.lock().unwrap().take().unwrap();
     assert_eq!(outcome.answer.first_plan, first.1);

@@ -66,7 +66,7 @@ fn run(world: &str, seed: u64) -> (String, bool) {
     let mut writer = TraceWriter::new(Arc::clone(&task), &mut sink);
     writer.header(&spec).expect("texts and numbers");
     let inputs = RunInputs::of(spec, Arc::clone(&task), &WorldNames::default()).expect("a world");
-    let execution = inputs.execution().expect("a consistent specification");
+    let execution = inputs.execution(None).expect("a consistent specification");
     let execution = execution.beginning_with(plan).recorded_by(&mut writer);
     let outcome = simulate(&inputs, execution, &mut NoObserver).expect("a world");
     let is_done = *outcome.verdict() == Ended::GoalReached;
@@ -542,7 +542,7 @@ fn reports_with_corrected_times_count() {
     let inputs = RunInputs::of(spec, Arc::clone(&task), &WorldNames::default()).expect("a world");
     let model = inputs.simulation().expect("a simulation");
     let mut world = Early(model.world(&task, inputs.spec().seed));
-    let execution = inputs.execution().expect("a consistent specification");
+    let execution = inputs.execution(None).expect("a consistent specification");
     let execution = execution.beginning_with(plan).recorded_by(&mut writer);
     answer_run(&inputs, execution, &mut world, &mut NoObserver).expect("a run");
     drop(writer);

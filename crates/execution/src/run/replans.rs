@@ -43,7 +43,7 @@ impl Replans {
     /// Returns how many new plans are permitted until an action is completed. See
     /// [`try_count`](Self::try_count).
     pub(super) fn remaining(&self, most: usize) -> usize {
-        let in_all = (MAX_ROUNDS * most).saturating_sub(self.count);
+        let in_all = MAX_ROUNDS.saturating_mul(most).saturating_sub(self.count);
         most.saturating_sub(self.without_progress).min(in_all)
     }
 
@@ -75,5 +75,43 @@ impl Replans {
 
     pub(super) fn take_reasons(&mut self) -> Vec<Reason> {
         std::mem::take(&mut self.reasons)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{MAX_ROUNDS, Replans};
+    use crate::reason::{Cause, Reason};
+
+    const MOST: usize = 3;
+
+    fn count(replans: &mut Replans) -> bool {
+        replans.try_count(&Reason::new(Cause::NewPlan), MOST)
+    }
+
+    #[test]
+    fn number_of_new_plans_is_limited_until_an_action_is_completed() {
+        let mut replans = Replans::default();
+        assert_eq!((0..5).filter(|_| count(&mut replans)).count(), MOST);
+        replans.note_progress();
+        assert!(count(&mut replans));
+        assert_eq!(replans.count(), MOST + 1);
+    }
+
+    #[test]
+    fn number_of_new_plans_is_limited_with_completed_actions_too() {
+        let mut replans = Replans::default();
+        let counted = (0..100).filter(|_| {
+            replans.note_progress();
+            count(&mut replans)
+        });
+        assert_eq!(counted.count(), MAX_ROUNDS * MOST);
+    }
+
+    #[test]
+    fn no_new_plan_is_permitted_if_the_limit_is_zero() {
+        let mut replans = Replans::default();
+        replans.note_progress();
+        assert!(!replans.try_count(&Reason::new(Cause::NewPlan), 0));
     }
 }

@@ -193,7 +193,7 @@ fn executed_with(
     let mut sink = |line: &str| trace.push_str(line);
     let recorder: Box<dyn Recorder + '_> =
         Box::new(operator.publishing(TraceWriter::new(Arc::clone(task), &mut sink), task, false));
-    let execution = inputs.execution().expect("a correct test");
+    let execution = inputs.execution(None).expect("a correct test");
     let execution = execution
         .on_belief(operator.listener())
         .recorded_by(recorder);
@@ -431,7 +431,7 @@ fn slack_equals_that_of_an_envelope_computed_again_from_the_trace() {
         let mut writer = TraceWriter::new(Arc::clone(task), &mut sink);
         writer.header(&spec).expect("texts");
         let recorder = operator.publishing(writer, task, false);
-        let execution = inputs.execution().expect("a correct test");
+        let execution = inputs.execution(None).expect("a correct test");
         let execution = execution
             .on_belief(operator.listener())
             .recorded_by(recorder);

@@ -84,7 +84,7 @@ impl Setting<'_> {
                 ..Settings::default()
             };
             let planner = has_plans.then(|| self.embedded());
-            action_values(task, &world, planner, settings, may_continue).ok()
+            action_values(task, &world, planner, Some(first), settings, may_continue).ok()
         });
         let action_values = action_values.flatten();
         let rehearse = (needs_rollouts && action_values.is_none()).then(|| {

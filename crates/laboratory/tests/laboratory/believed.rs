@@ -90,7 +90,7 @@ fn logs(experiment: &Experiment, count: u64, first: u64) -> Vec<Log> {
             writer.header(&spec).expect("texts and numbers");
             let inputs = RunInputs::of(spec, Arc::clone(&task), &WorldNames::default());
             let inputs = inputs.expect("a world");
-            let execution = inputs.execution().expect("a consistent specification");
+            let execution = inputs.execution(None).expect("a consistent specification");
             let execution = execution.beginning_with(plan.clone());
             let execution = execution.recorded_by(&mut writer);
             simulate(&inputs, execution, &mut NoObserver).expect("a world");

@@ -59,7 +59,7 @@ fn trace(case: &str, seed: u64) -> String {
     let mut writer = TraceWriter::new(Arc::clone(&task), &mut sink);
     writer.header(&spec).expect("a header");
     let inputs = RunInputs::of(spec, Arc::clone(&task), &WorldNames::default()).expect("texts");
-    let execution = inputs.execution().expect("a consistent specification");
+    let execution = inputs.execution(None).expect("a consistent specification");
     let execution = execution.beginning_with(plan).recorded_by(&mut writer);
     simulate(&inputs, execution, &mut NoObserver).expect("a run");
     lines

@@ -51,9 +51,8 @@ pub(super) fn run(path: &Path, as_json: bool, output: &mut Output) -> Answer {
     let mut replay = Replay::new(&stored, Arc::clone(task));
     let mut watch = StoredInterrupt(replay.interruption());
     let execution = inputs
-        .execution()
+        .execution(first)
         .map_err(unusable)?
-        .beginning_with(first)
         .resume_from(stand)
         .with_restarts(stored.restart_count())
         .with_planner(ReplayPlanner::new(&stored))

@@ -54,7 +54,7 @@ pub(super) fn render(answer: &RunAnswer, report: &Report, ends: RunEnd) -> Strin
             }
         }
         Verdict::ReplanLimit => format!(
-            "{}: stopped at {time}, after {replans}, the most that --max-replans allows\n",
+            "{}: stopped at {time}, after {replans}; --max-replans allows no more until an action is completed\n",
             styled(HINT, "limit")
         ),
         Verdict::TimeLimit => {

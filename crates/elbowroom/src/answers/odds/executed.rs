@@ -152,6 +152,7 @@ impl Services {
                 request.task,
                 world,
                 Some(planner()),
+                Some(subject.plan),
                 Settings::default(),
                 &may_continue,
             )

@@ -266,13 +266,17 @@ impl RunInputs {
         envelopes
     }
 
-    /// Returns the execution of the specification. The caller adds the planner, the initial plan
-    /// and the world. Tables and likelihoods for the executor are computed within limits that do
+    /// Returns the execution of the specification, which begins with the plan `first`; without one, the planner
+    /// makes it. The caller adds the planner and the world. Tables and likelihoods for the executor are computed within limits that do
     /// not depend on the machine.
     ///
     /// # Errors
     /// When its files cannot be read, or its members are inconsistent.
-    pub fn execution(&self) -> Result<Execution<'static>, SpecError> {
+    pub fn execution(
+        &self,
+        first: impl Into<Option<TimeTriggeredPlan>>,
+    ) -> Result<Execution<'static>, SpecError> {
+        let first = first.into();
         let (spec, task) = (&self.spec, &self.task);
         spec.check()?;
         if let Some(feature) = task.validator_only_feature() {
@@ -287,7 +291,7 @@ impl RunInputs {
         // A table of moves has a fixed goal.
         let has_table = spec.executor.needs().action_values && !spec.is_persistent;
         let table = model.filter(|_| has_table);
-        let table = table.map(|model| self.action_values(model, is_embedded));
+        let table = table.map(|model| self.action_values(model, is_embedded, first.as_ref()));
         let (table, no_table) = match table.transpose() {
             Ok(table) => (table, None),
             Err(why) => (None, Some(why)),
@@ -308,6 +312,7 @@ impl RunInputs {
         });
         Ok(Execution::of(task)
             .by(spec.executor.clone())
+            .beginning_with(first)
             .with_settings(spec.settings())
             .persistent(spec.is_persistent)
             .interactive(spec.is_interactive)
@@ -328,6 +333,7 @@ impl RunInputs {
         &self,
         model: &WorldModel,
         is_embedded: bool,
+        first: Option<&TimeTriggeredPlan>,
     ) -> Result<Arc<dyn ActionValues>, String> {
         let embedded = self.spec.embedded();
         let budget = work::Budget::new(embedded.work);
@@ -337,6 +343,7 @@ impl RunInputs {
             &self.task,
             model,
             planner,
+            first,
             Settings::default(),
             &may_continue,
         )

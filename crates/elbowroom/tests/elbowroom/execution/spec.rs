@@ -189,7 +189,7 @@ fn inconsistent_settings_are_rejected_before_the_run() {
         let mut spec = spec();
         change(&mut spec);
         let inputs = RunInputs::of(spec, Arc::clone(&task), &WorldNames::default());
-        inputs.and_then(|inputs| inputs.execution()).err()
+        inputs.and_then(|inputs| inputs.execution(None)).err()
     };
     let live = || "live:5".parse().expect("a correct test");
     assert!(check(&|_| {}).is_none());
@@ -239,7 +239,7 @@ fn answer_and_trace_lines_round_trip() {
         writer.header(&spec).expect("texts and numbers");
         let inputs = RunInputs::of(spec.clone(), Arc::clone(&task), &WorldNames::default());
         let inputs = inputs.expect("texts");
-        let execution = inputs.execution().expect("a consistent specification");
+        let execution = inputs.execution(None).expect("a consistent specification");
         let execution = execution.recorded_by(&mut writer);
         let outcome = simulate(&inputs, execution, &mut NoObserver);
         let answer = outcome.expect("a world").answer;
@@ -272,7 +272,7 @@ fn answer_of_policy(world: &str, budget: &str) -> RunAnswer {
         ..spec()
     };
     let (inputs, _) = RunInputs::read(spec).expect("a correct test");
-    let execution = inputs.execution().expect("a correct test");
+    let execution = inputs.execution(None).expect("a correct test");
     let outcome = simulate(&inputs, execution, &mut NoObserver).expect("a correct test");
     outcome.answer
 }
@@ -332,7 +332,7 @@ fn policy_does_not_start_a_refused_action_without_end() {
             ..RunSpec::new(domain.clone(), problem.clone())
         };
         let (inputs, _) = RunInputs::read(spec).expect("a correct test");
-        let execution = inputs.execution().expect("a correct test");
+        let execution = inputs.execution(None).expect("a correct test");
         let outcome = simulate(&inputs, execution, &mut NoObserver);
         let report = outcome.expect("a world").report;
         limits += usize::from(report.verdict == Verdict::ReplanLimit);
