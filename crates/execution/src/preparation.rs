@@ -160,14 +160,13 @@ forward_port!(Preparer {
 
 /// Decides for which parameter values a plan is guaranteed to work.
 pub trait RegionOracle: Send {
-    /// Returns the reason for which the plan is not guaranteed to work for these values; `None` if
-    /// it is.
-    fn find_violation(
+    /// Returns `true` if the plan is guaranteed to work for these values.
+    fn is_feasible(
         &mut self,
         task: &Arc<Task>,
         plan: &ParametrizedPlan,
         values: &Valuation,
-    ) -> Option<String>;
+    ) -> bool;
 
     /// Returns a box around these values for which the plan is guaranteed to work. Depending on the
     /// effort, the box may contain only the values themselves. If the plan is beyond exact
@@ -181,9 +180,10 @@ pub trait RegionOracle: Send {
         plan: &ParametrizedPlan,
         values: &Valuation,
     ) -> Result<DecoupledEnvelope, String> {
-        match self.find_violation(task, plan, values) {
-            None => Ok(DecoupledEnvelope::point(values)),
-            Some(why) => Err(why),
+        if self.is_feasible(task, plan, values) {
+            Ok(DecoupledEnvelope::point(values))
+        } else {
+            Err("the plan is not guaranteed to work with the observed values".to_owned())
         }
     }
 
@@ -209,7 +209,7 @@ pub trait RegionOracle: Send {
         let mut tried = values.clone();
         Box::new(move |value| {
             tried[parameter].clone_from(value);
-            self.find_violation(task, plan, &tried).is_none()
+            self.is_feasible(task, plan, &tried)
         })
     }
 

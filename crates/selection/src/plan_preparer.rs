@@ -368,27 +368,24 @@ fn extend_to_ranges(oracle: &mut Oracle, known: DecoupledEnvelope) -> DecoupledE
 }
 
 impl RegionOracle for ExactRegion {
-    fn find_violation(
+    fn is_feasible(
         &mut self,
         task: &Arc<Task>,
         plan: &ParametrizedPlan,
         values: &Valuation,
-    ) -> Option<String> {
+    ) -> bool {
         if !plan.reads_more_than_facts(task) {
             // The network contains all orderings that facts require, for any durations. The
             // executor has this network.
-            return None;
+            return true;
         }
-        let Ok(mut oracle) = Self::oracle_at(task, plan, values) else {
-            return Self::validate_at(task, plan, values).err();
-        };
-        let envelope = DecoupledEnvelope::point(values);
-        let Ok(objection) = oracle.objection(&envelope) else {
-            return Self::validate_at(task, plan, values).err();
-        };
-        let objection = objection?;
-        let explainer = Explainer::new(task, oracle.plan());
-        Some(explainer.objection(&oracle, &envelope, &objection).reason)
+        let objection = Self::oracle_at(task, plan, values)
+            .ok()
+            .and_then(|mut oracle| oracle.objection(&DecoupledEnvelope::point(values)).ok());
+        match objection {
+            Some(objection) => objection.is_none(),
+            None => Self::validate_at(task, plan, values).is_ok(),
+        }
     }
 
     /// Runs IRR with a small initial step, so that it stays near the values.

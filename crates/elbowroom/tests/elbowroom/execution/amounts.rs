@@ -183,15 +183,15 @@ struct Counting {
 }
 
 impl RegionOracle for Counting {
-    fn find_violation(
+    fn is_feasible(
         &mut self,
         task: &Arc<Task>,
         plan: &ParametrizedPlan,
         values: &Valuation,
-    ) -> Option<String> {
+    ) -> bool {
         let counts = usize::from(!self.finds_boxes);
         self.queries.fetch_add(counts, Ordering::Relaxed);
-        ExactRegion.find_violation(task, plan, values)
+        ExactRegion.is_feasible(task, plan, values)
     }
 
     fn surroundings(
@@ -204,8 +204,9 @@ impl RegionOracle for Counting {
             self.queries.fetch_add(1, Ordering::Relaxed);
             return ExactRegion.surroundings(task, plan, values);
         }
-        let works = self.find_violation(task, plan, values).map_or(Ok(()), Err);
-        works.map(|()| DecoupledEnvelope::point(values))
+        let is_feasible = self.is_feasible(task, plan, values);
+        let point = is_feasible.then(|| DecoupledEnvelope::point(values));
+        point.ok_or_else(|| "not feasible".to_owned())
     }
 
     fn is_asked_inside(&self) -> bool {

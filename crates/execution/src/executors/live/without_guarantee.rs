@@ -144,9 +144,7 @@ impl ExecutedPlan {
             ..self.clone()
         };
         let (plan, values) = rest.remaining_plan(now);
-        region
-            .find_violation(&self.prepared_plan.task, &plan, &values)
-            .is_none()
+        region.is_feasible(&self.prepared_plan.task, &plan, &values)
     }
 
     /// Continues by the plan's orderings. Deadlines are ignored from now on; numbers still limit running actions.

@@ -125,13 +125,8 @@ impl Preparer for ManualPreparer {
 struct UnlimitedRegion;
 
 impl RegionOracle for UnlimitedRegion {
-    fn find_violation(
-        &mut self,
-        _: &Arc<Task>,
-        _: &ParametrizedPlan,
-        _: &Valuation,
-    ) -> Option<String> {
-        None
+    fn is_feasible(&mut self, _: &Arc<Task>, _: &ParametrizedPlan, _: &Valuation) -> bool {
+        true
     }
 }
 
