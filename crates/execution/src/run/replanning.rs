@@ -218,8 +218,11 @@ impl Run<'_> {
         match guess {
             // Overdue actions may still end in time.
             OverrunEstimate::QuarterLonger => NextAttempt::Guess(OverrunEstimate::AsSoonAsPossible),
-            // They are only cancelled if there is a plan without them.
-            OverrunEstimate::AsSoonAsPossible if self.may_carry_on() => {
+            // They are only cancelled if there is a plan without them: another goal may be the one
+            // that cannot be reached.
+            OverrunEstimate::AsSoonAsPossible
+                if self.may_carry_on() || self.goals.open().open.len() > 1 =>
+            {
                 NextAttempt::Guess(OverrunEstimate::Cancelled)
             }
             OverrunEstimate::AsSoonAsPossible => NextAttempt::CancelOverdue,

@@ -3,9 +3,12 @@
 use std::sync::Arc;
 
 use elbowroom::model::Task;
+use elbowroom::num::Rational;
 use elbowroom::pddl::{self, Source};
 
-use super::scripted::{abandon, assert_has, has, pursue, pursue_by, pursue_with_value, run, task};
+use super::scripted::{
+    abandon, assert_has, has, pursue, pursue_by, pursue_with_value, run, run_with_slow_action, task,
+};
 
 const NEVER: &str = "because (not (here book)) can never become true";
 
@@ -289,6 +292,38 @@ fn late_goal_is_set_aside_and_fails_at_its_deadline() {
             "rest: goal-reached lab",
         ],
     );
+}
+
+#[test]
+fn late_action_is_not_cancelled_if_only_one_of_the_goals_is_lost() {
+    let domain = "(define (domain rooms)
+      (:requirements :durative-actions :typing :timed-initial-literals)
+      (:types room) (:predicates (at ?x - room) (day) (seen ?x - room))
+      (:durative-action move :parameters (?x ?y - room) :duration (= ?duration 10)
+        :condition (at start (at ?x)) :effect (and (at start (not (at ?x))) (at end (at ?y))))
+      (:durative-action look :parameters (?x - room) :duration (= ?duration 1)
+        :condition (and (at start (day)) (over all (at ?x))) :effect (at end (seen ?x))))";
+    let problem = "(define (problem p) (:domain rooms) (:objects home lab ward - room)
+       (:init (at home) (day) (at 12 (not (day)))) (:goal (and)))";
+    let source = |text: &str| Source::new("test", text);
+    let read = pddl::read_problem(&source(domain), &source(problem));
+    let task = Arc::new(Task::new(read.expect("a correct test").0));
+    let script = vec![
+        (0, pursue("ward", "(seen ward)")),
+        (0, pursue("lab", "(at lab)")),
+    ];
+    let slow = ("(move home ward)", Rational::from(18));
+    let told = run_with_slow_action(&task, 100, script, slow);
+    assert_has(
+        &told,
+        &[
+            "start (move home ward)",
+            "`ward` set aside",
+            "18: start (move ward lab)",
+            "28: rest",
+        ],
+    );
+    assert!(!has(&told, "cancel"), "{:#?}", told.notes);
 }
 
 #[test]

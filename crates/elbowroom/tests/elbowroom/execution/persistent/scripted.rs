@@ -241,10 +241,36 @@ pub(super) fn run_interactive(
     scripted(task, end, script, |execution| execution.interactive(true))
 }
 
+/// Makes a persistent run in which one action takes so long. Late actions are monitored.
+pub(super) fn run_with_slow_action(
+    task: &Arc<Task>,
+    end: i64,
+    script: Vec<(impl Into<Rational>, Event)>,
+    slow: (&'static str, Rational),
+) -> RunResult {
+    scripted_with(task, end, script, Some(slow), |execution| {
+        let settings = RunSettings {
+            monitors_slack: true,
+            ..RunSettings::default()
+        };
+        execution.with_settings(settings).persistent(true)
+    })
+}
+
 pub(super) fn scripted(
     task: &Arc<Task>,
     end: i64,
     script: Vec<(impl Into<Rational>, Event)>,
+    kind: impl FnOnce(Execution<'_>) -> Execution<'_>,
+) -> RunResult {
+    scripted_with(task, end, script, None, kind)
+}
+
+fn scripted_with(
+    task: &Arc<Task>,
+    end: i64,
+    script: Vec<(impl Into<Rational>, Event)>,
+    slow: Option<(&'static str, Rational)>,
     kind: impl FnOnce(Execution<'_>) -> Execution<'_>,
 ) -> RunResult {
     let must_end = Arc::new(AtomicBool::new(false));
@@ -257,7 +283,7 @@ pub(super) fn scripted(
         coming: script.collect(),
         end: Rational::from(end),
         stop_requested: Arc::clone(&must_end),
-        slow: None,
+        slow,
         on_cancel: None,
     };
     let (notes, plans) = (Notes::default(), Arc::new(Mutex::new(0)));
