@@ -61,20 +61,28 @@ impl Default for Request {
 /// When the network cannot be simulated as requested.
 pub fn analyze(file: &NetworkFile, request: &Request) -> Result<Answer, SimulationError> {
     let consistent = reasons::consistent(file);
-    let form = file.network.dispatchable();
+    // Most networks have many more bounds in their dispatchable form. Only simulation needs it.
+    let form = request
+        .simulation
+        .is_some()
+        .then(|| file.network.dispatchable());
     let (mut weak, mut dynamic, mut strong) = (None, None, None);
     if !file.is_certain() {
-        weak = Some(match &form {
-            Ok(_) => ControllabilityCheck::yes(),
+        let is_controllable = match &form {
+            Some(form) => form.as_ref().map(|_| ()).map_err(Clone::clone),
+            None => file.network.check_controllability(),
+        };
+        weak = Some(match &is_controllable {
+            Ok(()) => ControllabilityCheck::yes(),
             Err(_) => reasons::weak(file, request.most_branches),
         });
-        dynamic = Some(match &form {
-            Ok(_) => ControllabilityCheck::yes(),
+        dynamic = Some(match &is_controllable {
+            Ok(()) => ControllabilityCheck::yes(),
             Err(conflict) => reasons::dynamic(file, conflict),
         });
         strong = Some(reasons::strong(file));
     }
-    let form: Option<Arc<Dispatchable<Rational>>> = form.ok().map(Arc::new);
+    let form: Option<Arc<Dispatchable<Rational>>> = form.and_then(Result::ok).map(Arc::new);
     let simulation = match &request.simulation {
         Some(simulation) => Some(simulate::run(file, form, simulation)?),
         None => None,

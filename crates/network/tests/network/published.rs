@@ -93,8 +93,10 @@ fn the_published_verdicts_are_reproduced() {
         let file = read_file(&folder.join(name)).expect(name);
         assert_eq!(file.network.links().len().to_string(), links, "{name}");
         let _ = (points, edges);
-        let is_controllable = file.network.clone().dispatchable().is_ok();
+        let is_controllable = file.network.dispatchable().is_ok();
         assert_eq!(is_controllable, verdict == "DC", "{name}");
+        let check = file.network.check_controllability();
+        assert_eq!(check.is_ok(), is_controllable, "{name}");
         checked += 1;
     }
     println!("{checked} verdicts");

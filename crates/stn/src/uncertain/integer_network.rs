@@ -121,12 +121,30 @@ impl UncertainNetwork<Rational> {
         }
     }
 
+    /// Like [`conflict`](Self::conflict), but computes in whole numbers if possible. The check
+    /// takes much less time than the dispatchable form.
+    ///
+    /// # Errors
+    /// The cycle that shows that the network is not dynamically controllable.
+    pub fn check_controllability(&self) -> Result<(), Conflict> {
+        self.search_in_whole_numbers(false, false).map(|_| ())
+    }
+
     fn search_graph(&self, is_full: bool) -> Result<Graph<Rational>, Conflict> {
+        self.search_in_whole_numbers(true, is_full)
+    }
+
+    /// Like [`search`](Self::search), but computes in whole numbers if possible.
+    fn search_in_whole_numbers(
+        &self,
+        keeps_edges: bool,
+        is_full: bool,
+    ) -> Result<Graph<Rational>, Conflict> {
         let Some(whole) = self.to_integer_network() else {
-            return self.search(true, is_full);
+            return self.search(keeps_edges, is_full);
         };
         let fraction = |number: i64| whole.unit.to_fraction(number);
-        let found = whole.network.search(true, is_full);
+        let found = whole.network.search(keeps_edges, is_full);
         found
             .map(|graph| graph.map(fraction))
             .map_err(|conflict| conflict.map(fraction))

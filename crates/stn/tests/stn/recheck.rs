@@ -88,6 +88,12 @@ fn integer_weights_give_same_result() {
             upper: link.upper.map(seventh),
         });
         let fractions = UncertainNetwork::new(requirements, links.collect()).unwrap();
+        let conflict = fractions.dispatchable().err();
+        assert_eq!(
+            fractions.check_controllability().err(),
+            conflict,
+            "seed {seed}"
+        );
         let whole = fractions.clone().into_executable();
         for (one, other) in [
             (fractions.dynamic(), fractions.dispatchable()),
