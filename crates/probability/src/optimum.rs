@@ -27,6 +27,7 @@
 //! without it, any agent that performs arbitrary steps for long enough succeeds with certainty.
 
 mod process;
+mod reachable;
 mod small_world;
 mod table;
 mod value_iteration;
@@ -39,6 +40,7 @@ use crate::search_state::SearchState;
 use crate::total_order::Slot;
 
 pub use process::Perturbed;
+pub use reachable::{ValueBounds, value_bounds};
 pub use small_world::{PolicyTable, best_value};
 
 /// Limit on the number of steps of a run.
@@ -96,6 +98,12 @@ pub enum TabulationError {
     TooManyStates {
         /// Number of relevant facts.
         facts: usize,
+        /// Number of actions.
+        actions: usize,
+    },
+    /// Too many actions.
+    #[error("the optimum does not support {actions} actions")]
+    TooManyActions {
         /// Number of actions.
         actions: usize,
     },

@@ -100,7 +100,7 @@ fn published_values_of_first_order_are_reproduced() {
         // Retrying increases the probability, and so do all other actions.
         let value = |answer: &ValueAnswer| match answer {
             ValueAnswer::Probability(p) => *p,
-            ValueAnswer::Unknown(why) => panic!("{why}"),
+            other => panic!("{other:?}"),
         };
         let (own, any) = (
             value(&odds.gains.as_the_state_asks),

@@ -9,7 +9,8 @@ use elbowroom_model::{Step, Task};
 use elbowroom_num::Rational;
 use elbowroom_plan::{Instance, PartialOrderPlan};
 
-use super::{Optimum, Perturbed, Settings, TabulationError};
+use super::reachable::value_bounds;
+use super::{Optimum, Perturbed, Settings, TabulationError, ValueBounds};
 use crate::actions::all_actions_under;
 use crate::dispatch::Choice;
 use crate::likelihoods::Likelihoods;
@@ -27,6 +28,15 @@ const MAX_STATES: usize = 1 << 18;
 
 /// Largest number of facts, even with few actions.
 const MAX_FACTS: usize = 16;
+
+/// Largest number of actions for which bounds on the optimal value are computed.
+const MAX_ACTIONS: usize = 1000;
+
+/// Limit on the number of explored nodes of a world with a smaller table.
+const MIN_NODES: usize = 1000;
+
+/// Limit on the number of explored nodes of a world that is too large for a table.
+const MAX_NODES: usize = 400_000;
 
 /// Optimal policy of a small world.
 #[derive(Clone, Debug)]
@@ -117,39 +127,52 @@ fn table_search(process: &Perturbed) -> OrderSearch {
     OrderSearch::new(Arc::clone(process.model()), SearchSettings::default())
 }
 
-/// Returns the probability that an optimal agent reaches the goal with these actions. It may try
-/// them any number of times and observes the state. In a dead end, it has lost. At most three
-/// actions run at once, and an action is abandoned when its over-all condition fails.
+/// Returns bounds on the probability that an optimal agent reaches the goal with these actions. It
+/// may try them any number of times and observes the state. In a dead end, it has lost. At most
+/// three actions run at once, and an action is abandoned when its over-all condition fails.
 ///
 /// # Errors
-/// When the world is too large, or has other features than facts.
+/// When the world has too many actions or uncertain facts, or has other features than facts.
 pub fn best_value(
     task: &Task,
     actions: Vec<Action>,
     likelihoods: &Likelihoods,
     circumstances: &SearchState,
-) -> Result<f64, TabulationError> {
+) -> Result<ValueBounds, TabulationError> {
+    if actions.len() > MAX_ACTIONS {
+        return Err(TabulationError::TooManyActions {
+            actions: actions.len(),
+        });
+    }
     let plan = PartialOrderPlan::unordered(task, actions);
     let model = Model::new(task.clone(), plan, likelihoods, Semantics::World);
     let model = model.map_err(|missing| TabulationError::Unsupported {
         what: missing.to_string(),
     })?;
-    let (facts, actions) = (model.facts().count(), model.plan().instances.len());
-    if facts > MAX_FACTS || actions > 20 || sets(actions) << facts > MAX_STATES {
-        return Err(TabulationError::TooManyStates { facts, actions });
+    let model = Arc::new(model);
+    if OrderSearch::new(Arc::clone(&model), SearchSettings::default()).has_couplings() {
+        return Err(TabulationError::Unsupported {
+            what: "actions need each other at the same time".to_owned(),
+        });
     }
     let settings = Settings {
         most_running: MAX_RUNNING,
         enforces_over_all: true,
         ..Settings::default()
     };
-    let process = Perturbed::new(model, settings)?;
-    if table_search(&process).has_couplings() {
-        return Err(TabulationError::Unsupported {
-            what: "actions need each other at the same time".to_owned(),
-        });
+    let (facts, actions) = (model.facts().count(), model.plan().instances.len());
+    let table_size = (facts <= MAX_FACTS && actions <= 20)
+        .then(|| sets(actions) << facts)
+        .filter(|states| *states <= MAX_STATES);
+    let max_nodes = table_size.map_or(MAX_NODES, |states| states.max(MIN_NODES));
+    let bounds = value_bounds(&model, &settings, circumstances, max_nodes);
+    let is_known = bounds.as_ref().is_ok_and(ValueBounds::is_exact);
+    if is_known || table_size.is_none() {
+        return bounds;
     }
-    Ok(process.optimum().value(&process, circumstances))
+    let process = Perturbed::new(model, settings)?;
+    let value = process.optimum().value(&process, circumstances);
+    Ok(ValueBounds::exact(value))
 }
 
 /// Removes spontaneous changes that make facts true. Otherwise every step would be a chance of such

@@ -45,28 +45,38 @@ pub(super) fn check(model: &Model) -> Result<(), TabulationError> {
 /// Returns `true` for the states where a requirement holds.
 pub(super) fn table(model: &Model, requirement: &Requirement) -> Vec<bool> {
     (0..1_usize << model.facts.len())
-        .map(|state| {
-            let literals = requirement.literals.iter();
-            let coupled = requirement.coupled.iter().map(|coupled| &coupled.condition);
-            literals
-                .copied()
-                .all(|(fact, truth)| (state & (1 << fact) != 0) == truth)
-                && requirement
-                    .numeric
-                    .iter()
-                    .chain(coupled)
-                    .all(|c| holds(model, c, state))
-        })
+        .map(|state| is_satisfied(model, requirement, &|fact| state & (1 << fact) != 0))
         .collect()
+}
+
+/// Returns `true` if a requirement holds with these truth values of the model's facts.
+pub(super) fn is_satisfied(
+    model: &Model,
+    requirement: &Requirement,
+    truth: &dyn Fn(usize) -> bool,
+) -> bool {
+    let mut literals = requirement.literals.iter();
+    let coupled = requirement.coupled.iter().map(|coupled| &coupled.condition);
+    literals.all(|&(fact, wanted)| truth(fact) == wanted)
+        && requirement
+            .numeric
+            .iter()
+            .chain(coupled)
+            .all(|condition| holds_in(model, condition, truth))
 }
 
 /// Returns `true` if a condition holds in a state.
 pub(super) fn holds(model: &Model, condition: &Condition, state: usize) -> bool {
-    let truth = |fact: FactId| {
-        model
-            .position(fact)
-            .is_some_and(|at| state & (1 << at) != 0)
-    };
+    holds_in(model, condition, &|fact| state & (1 << fact) != 0)
+}
+
+/// Returns `true` if a condition holds with these truth values of the model's facts.
+pub(super) fn holds_in(
+    model: &Model,
+    condition: &Condition,
+    truth: &dyn Fn(usize) -> bool,
+) -> bool {
+    let truth = |fact: FactId| model.position(fact).is_some_and(truth);
     // Numbers are constant here.
     let value = |leaf: &Expression| match leaf {
         Expression::Fluent(fluent) => model.task().initial().values.get(fluent).into(),

@@ -11,6 +11,7 @@ mod order_tracking;
 mod partial_order;
 mod pgmpy;
 mod published;
+mod reachable;
 mod reference;
 mod shared;
 mod untimed_worlds;

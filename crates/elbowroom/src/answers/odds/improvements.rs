@@ -2,7 +2,7 @@
 
 use elbowroom_execution::PlanAnswer;
 use elbowroom_model::ground::Action;
-use elbowroom_probability::optimum::best_value;
+use elbowroom_probability::optimum::{ValueBounds, best_value};
 use elbowroom_probability::{SearchStop, all_actions_under};
 use serde::{Deserialize, Serialize};
 
@@ -33,12 +33,19 @@ pub struct BestOrderAnswer {
     pub happenings: Vec<String>,
 }
 
-/// A value that can be computed only in small worlds without time.
+/// A value that can be computed only in worlds without time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ValueAnswer {
     /// The value.
     Probability(f64),
+    /// Bounds on the value, in a world with too many states.
+    Bounds {
+        /// Success probability of some agent.
+        lower: f64,
+        /// No agent has a greater success probability.
+        upper: f64,
+    },
     /// The reason why it cannot be computed.
     Unknown(String),
 }
@@ -130,7 +137,8 @@ impl ValueAnswer {
     fn of(subject: &Subject<'_>, actions: Vec<Action>) -> Self {
         let request = subject.request;
         match best_value(request.task, actions, request.likelihoods, &subject.initial) {
-            Ok(value) => Self::Probability(value),
+            Ok(bounds) if bounds.is_exact() => Self::Probability(bounds.lower),
+            Ok(ValueBounds { lower, upper }) => Self::Bounds { lower, upper },
             Err(error) => Self::Unknown(error.to_string()),
         }
     }

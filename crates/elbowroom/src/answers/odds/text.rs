@@ -201,6 +201,10 @@ fn gains(text: &mut String, odds: &Odds, look: TextLayout) {
     let mut unknown: Vec<(String, String)> = Vec::new();
     let mut value = |value: &ValueAnswer, what: &str| match value {
         ValueAnswer::Probability(p) => rows.push(row(*p, what.to_owned())),
+        ValueAnswer::Bounds { lower, upper } => {
+            let range = format!("{} to {}", number(*lower), number(*upper));
+            rows.push(vec![range, format!("{what} (bounds)")]);
+        }
         ValueAnswer::Unknown(why) => match unknown.iter_mut().find(|(_, known)| known == why) {
             Some((all, _)) => *all = format!("{all}, or {what}"),
             None => unknown.push((what.to_owned(), why.clone())),
