@@ -36,7 +36,7 @@ const MAX_ACTIONS: usize = 1000;
 const MIN_NODES: usize = 1000;
 
 /// Limit on the number of explored nodes of a world that is too large for a table.
-const MAX_NODES: usize = 400_000;
+const MAX_NODES: usize = 200_000;
 
 /// Optimal policy of a small world.
 #[derive(Clone, Debug)]

@@ -60,7 +60,7 @@ pub(super) struct Graph<'m> {
 const ENOUGH: f64 = 1e-4;
 
 /// Largest number of times that the likeliest open nodes are expanded.
-const MAX_ROUNDS: usize = 30;
+const MAX_ROUNDS: usize = 4;
 
 /// Largest number of edges per node of the limit.
 const EDGES_PER_NODE: usize = 8;

@@ -8,7 +8,7 @@ use super::{Branch, CHOICE, Graph, Node, number};
 const SETTLED: f64 = 1e-12;
 
 /// Limit on the evaluated edges of one computation of all values.
-const MAX_EDGES: usize = 200_000_000;
+const MAX_EDGES: usize = 40_000_000;
 
 /// Values by node.
 pub(super) struct Values {
