@@ -202,7 +202,9 @@ fn gains(text: &mut String, odds: &Odds, look: TextLayout) {
     let mut value = |value: &ValueAnswer, what: &str| match value {
         ValueAnswer::Probability(p) => rows.push(row(*p, what.to_owned())),
         ValueAnswer::Bounds { lower, upper } => {
-            let range = format!("{} to {}", number(*lower), number(*upper));
+            // Four digits, rounded outwards.
+            let (lower, upper) = ((lower * 1e4).floor() / 1e4, (upper * 1e4).ceil() / 1e4);
+            let range = format!("{} to {}", number(lower), number(upper));
             rows.push(vec![range, format!("{what} (bounds)")]);
         }
         ValueAnswer::Unknown(why) => match unknown.iter_mut().find(|(_, known)| known == why) {

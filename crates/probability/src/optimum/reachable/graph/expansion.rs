@@ -39,7 +39,9 @@ impl<'m> Expansion<'m> {
     pub(super) fn bits(&self, facts: &[usize]) -> Bits {
         let length = self.first_action + self.model.plan().instances.len();
         let mut bits = vec![0; length.div_ceil(64)].into_boxed_slice();
-        facts.iter().for_each(|&fact| set(&mut bits, fact, true));
+        for &fact in facts {
+            set(&mut bits, fact, true);
+        }
         bits
     }
 

@@ -62,8 +62,8 @@ impl Graph<'_> {
     /// Returns the best branch of a node and its value.
     fn best_branch(&self, node: usize, values: &[f64]) -> Option<(&Branch, f64)> {
         let branches = self.branches_of(node).iter();
-        let valued = branches.map(|branch| (branch, self.value_of(node, branch, values)));
-        valued.reduce(|best, other| if other.1 > best.1 { other } else { best })
+        let rated = branches.map(|branch| (branch, self.value_of(node, branch, values)));
+        rated.reduce(|best, other| if other.1 > best.1 { other } else { best })
     }
 
     /// Returns the value of a branch that is taken again whenever it leads back to its node.
