@@ -160,7 +160,7 @@ class Odds(Table):
     def gains(self) -> dict[str, float | None]:
         """The probability with another order, with another plan, or with actions chosen by the observed state.
 
-        ``None`` if it cannot be computed; ``.document["gains"]`` has the reason.
+        ``None`` if it cannot be computed, or only within bounds; ``.document["gains"]`` has the reason or the bounds.
         """
         found: dict[str, dict[str, Any] | None] = self.document.get("gains", {})
         return {name: (it or {}).get("probability") for name, it in found.items()}
