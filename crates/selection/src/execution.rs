@@ -398,7 +398,7 @@ impl<'a> Execution<'a> {
                     action_values: self.action_values.filter(|_| needs.action_values),
                     rollout: self.rollouts.as_ref().map(|it| it.evaluator()),
                     has_planner: self.settings.max_replans > 0
-                        && self.planner.as_ref().is_none_or(|it| it.makes_plans()),
+                        && self.planner.as_ref().is_none_or(Planner::makes_plans),
                 })
             }
         };
