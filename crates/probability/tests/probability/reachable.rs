@@ -31,7 +31,7 @@ fn random_case(rng: &mut ChaCha8Rng, round: usize) -> Case {
     if round % 5 == 1 {
         case = with_outcomes(rng, case);
     }
-    if round % 2 == 0 {
+    if round.is_multiple_of(2) {
         let likelihoods = &mut case.likelihoods;
         likelihoods.defaults.becomes_true = Some(0.0);
         likelihoods.defaults.becomes_false = Some(0.0);
@@ -42,7 +42,7 @@ fn random_case(rng: &mut ChaCha8Rng, round: usize) -> Case {
         }
     }
     case.circumstances = SearchState::initial(&case.task);
-    if round % 3 == 0 {
+    if round.is_multiple_of(3) {
         for fact in case.facts().collect::<Vec<_>>() {
             let probability = [0.0, 0.3, 1.0][rng.random_range(0..3)];
             case.circumstances.belief.set(fact, probability);
@@ -103,13 +103,13 @@ fn read_task(domain: &str, problem: &str) -> Task {
 
 /// Robots that each have to visit all rooms of a row. A move that fails leaves its robot where it
 /// was, or, with probability `lost`, nowhere.
-struct Rooms {
+struct Corridors {
     robots: usize,
     rooms: usize,
     lost: f64,
 }
 
-impl Rooms {
+impl Corridors {
     fn value(&self, entries: &str) -> ValueBounds {
         let (task, likelihoods) = self.read(entries);
         let actions = all_actions_under(&task, &likelihoods).unwrap();
@@ -168,7 +168,7 @@ impl Rooms {
 #[test]
 fn robots_in_rooms_have_the_value_of_the_closed_form() {
     for (robots, rooms) in [(1, 6), (1, 100), (2, 20), (4, 10), (10, 5)] {
-        let world = Rooms {
+        let world = Corridors {
             robots,
             rooms,
             lost: 0.1,
@@ -185,12 +185,12 @@ fn robots_in_rooms_have_the_value_of_the_closed_form() {
 
 #[test]
 fn facts_that_change_by_themselves_couple_the_robots() {
-    let world = Rooms {
+    let world = Corridors {
         robots: 2,
         rooms: 2,
         lost: 0.1,
     };
-    let alone = Rooms { robots: 1, ..world };
+    let alone = Corridors { robots: 1, ..world };
     let closing = "[facts.door]\nbecomes_true = 0.0\nbecomes_false = 0.05\n";
     let (alone, both) = (alone.value(closing), world.value(closing));
     assert!(alone.is_exact() && both.is_exact(), "{alone:?} {both:?}");
@@ -203,7 +203,7 @@ fn facts_that_change_by_themselves_couple_the_robots() {
 
 #[test]
 fn large_coupled_world_has_bounds() {
-    let world = Rooms {
+    let world = Corridors {
         robots: 3,
         rooms: 5,
         lost: 0.0,
