@@ -15,9 +15,6 @@ use crate::executor::{PreparedPlan, StepId};
 use crate::preparation::RegionOracle;
 use crate::reason::{GuaranteeLevel, Reason};
 
-/// Maximum number of early starts of a plan. Each may need a new plan, whose number is limited.
-const MAX_EARLY_STARTS: usize = 4;
-
 /// The slack, as a share of the planned duration, with which no early start is needed.
 fn sufficient_slack() -> Rational {
     Rational::new(1, 2)
@@ -57,16 +54,13 @@ struct Overlap {
 }
 
 /// Returns the plan without the orders that some repeatable actions need to succeed, so that these
-/// start early. `None` if there are none or too many, or if numbers depend on durations.
+/// start early. `None` if there are none, or if numbers depend on durations.
 fn plan_with_early_starts(mission: &PreparedPlan) -> Option<PreparedPlan> {
     let constraints = mission.plan.plan.constraints.iter().enumerate();
     let overlaps: Vec<Overlap> = constraints
         .filter_map(|(index, constraint)| narrow_overlap(mission, index, constraint))
         .collect();
-    if overlaps.is_empty()
-        || overlaps.len() > MAX_EARLY_STARTS
-        || mission.plan.durations_move_numbers()
-    {
+    if overlaps.is_empty() || mission.plan.durations_move_numbers() {
         return None;
     }
     let mut mission = mission.clone();

@@ -93,7 +93,7 @@ fn doubt(share: f64) -> f64 {
 #[allow(clippy::cast_precision_loss, reason = "there are few runs")]
 fn table_is_reached_and_no_other_executor_is_better_than_those_with_likelihoods() {
     let seeds = std::env::var("ELBOWROOM_WORLDS").ok();
-    let seeds = seeds.map_or(25, |seeds| seeds.parse().expect("a number of seeds"));
+    let seeds = seeds.map_or(40, |seeds| seeds.parse().expect("a number of seeds"));
     let (mut worlds, mut promises) = (0, 0);
     let mut broken = Vec::new();
     // By executor with and without likelihoods: the number of runs that only the second wins, and
