@@ -1,6 +1,5 @@
 //! Preparation of plans in the background.
 
-use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use elbowroom::execute::{ExactRegion, PlanPreparer, RunInputs};
@@ -19,7 +18,7 @@ use crate::completion_signal::{Completion, CompletionSignal};
 /// preparation adds facts to that table, their numbers are unknown to the run; the plan is then prepared again when it
 /// is collected.
 pub struct BackgroundPreparer {
-    analyst: PlanPreparer,
+    analyst: PlanPreparer<'static>,
     executor: ExecutorSpec,
     signal: CompletionSignal,
     work: Option<Work>,
@@ -47,13 +46,7 @@ impl BackgroundPreparer {
         let (analyst, executor) = (self.analyst.clone(), self.executor.clone());
         let work = BackgroundTask::spawn("preparer", &self.signal, move |cancel| {
             let cancel = cancel.clone();
-            let mut analyst = analyst.with_limit(move || {
-                if cancel.is_requested() {
-                    ControlFlow::Break(())
-                } else {
-                    ControlFlow::Continue(())
-                }
-            });
+            let mut analyst = analyst.stopped_unless(move || !cancel.is_requested());
             let before = size(&own);
             let mission = PreparationRequest {
                 task: &own,

@@ -322,6 +322,11 @@ impl<'a> Execution<'a> {
         self.planner.is_some()
     }
 
+    /// Returns `true` if a preparer was set.
+    pub fn has_preparer(&self) -> bool {
+        self.preparer.is_some()
+    }
+
     /// Returns the state from which the run is resumed, if any.
     pub fn snapshot(&self) -> Option<&RunSnapshot> {
         self.snapshot.as_ref()

@@ -35,53 +35,58 @@ use crate::vary::is_about_an_absent_action;
 
 /// Prepares plans with [`pipeline`].
 #[derive(Clone)]
-pub struct PlanPreparer {
+pub struct PlanPreparer<'a> {
     settings: EnvelopeSettings,
-    limit: Option<Limit>,
+    may_continue: Option<MayContinue<'a>>,
 }
 
 /// Maximum number of times that open durations are chosen for a plan, each with a new envelope.
 const MAX_CHOICES: usize = 4;
 
 /// Decides whether the computation of an envelope continues.
-type Limit = Arc<dyn Fn() -> ControlFlow<()> + Send + Sync>;
+type MayContinue<'a> = Arc<dyn Fn() -> bool + Send + Sync + 'a>;
 
-impl fmt::Debug for PlanPreparer {
+impl fmt::Debug for PlanPreparer<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { settings, limit } = self;
-        f.debug_struct("Analyst")
+        let Self {
+            settings,
+            may_continue,
+        } = self;
+        f.debug_struct("PlanPreparer")
             .field("settings", settings)
-            .field("has_limit", &limit.is_some())
+            .field("has_limit", &may_continue.is_some())
             .finish()
     }
 }
 
-impl PlanPreparer {
+impl PlanPreparer<'_> {
     /// Creates a preparer. It ignores the specifications in `settings.vary` that name nothing in a
     /// plan.
     pub fn new(settings: EnvelopeSettings) -> Self {
         Self {
             settings,
-            limit: None,
+            may_continue: None,
         }
     }
 
-    /// Stops the computation of an envelope when `limit` breaks, and uses the box found so far.
-    /// `limit` is called after each step. The box is sound at any time, but may be smaller than
-    /// possible.
+    /// Stops the computation of an envelope when `may_continue` returns `false`, and uses the box
+    /// found so far. It is called after each step. The box is sound at any time, but may be smaller
+    /// than possible.
     #[must_use]
-    pub fn with_limit(
-        mut self,
-        limit: impl Fn() -> ControlFlow<()> + Send + Sync + 'static,
-    ) -> Self {
-        self.limit = Some(Arc::new(limit));
-        self
+    pub fn stopped_unless<'l>(
+        self,
+        may_continue: impl Fn() -> bool + Send + Sync + 'l,
+    ) -> PlanPreparer<'l> {
+        PlanPreparer {
+            settings: self.settings,
+            may_continue: Some(Arc::new(may_continue)),
+        }
     }
 
     fn flow(&self) -> ControlFlow<()> {
-        match &self.limit {
-            Some(limit) => limit(),
-            None => ControlFlow::Continue(()),
+        match &self.may_continue {
+            Some(may_continue) if !may_continue() => ControlFlow::Break(()),
+            _ => ControlFlow::Continue(()),
         }
     }
 
@@ -157,7 +162,7 @@ impl PlanPreparer {
     }
 }
 
-impl Preparer for PlanPreparer {
+impl Preparer for PlanPreparer<'_> {
     /// Of a plan with an open network, the starts of some actions are postponed if that gives it
     /// more slack.
     fn prepare(
@@ -177,7 +182,7 @@ impl Preparer for PlanPreparer {
     }
 }
 
-impl PlanPreparer {
+impl PlanPreparer<'_> {
     /// Prepares the plan with its own starts as planned times.
     fn prepare_as_given(
         &self,

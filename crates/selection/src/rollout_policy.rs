@@ -2,7 +2,6 @@
 
 mod sample_set;
 
-use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use elbowroom_execution::executors::{self, ExecutorServices, ExecutorSpec, OrderCache, Role};
@@ -80,9 +79,9 @@ pub struct RolloutPolicy {
     planner: Embedded<'static>,
     planning_time: Rational,
     /// Preparer of adopted plans.
-    preparer: CachingPreparer<PlanPreparer>,
+    preparer: CachingPreparer<PlanPreparer<'static>>,
     /// Preparer of plans in samples, with a quickly computed envelope.
-    sample_preparer: CachingPreparer<PlanPreparer>,
+    sample_preparer: CachingPreparer<PlanPreparer<'static>>,
     /// The best plan for a situation, kept until the planner port is called for this situation.
     chosen: Option<(Situation, TimeTriggeredPlan)>,
     /// Results for the beginnings of runs, by plan.
@@ -140,9 +139,12 @@ impl RolloutEvaluator for SharedRolloutPolicy {
 /// Returns the preparer of adopted plans, and that of plans in samples.
 fn preparers(
     flow: &EnvelopeSettings,
-) -> (CachingPreparer<PlanPreparer>, CachingPreparer<PlanPreparer>) {
+) -> (
+    CachingPreparer<PlanPreparer<'static>>,
+    CachingPreparer<PlanPreparer<'static>>,
+) {
     let analyst = PlanPreparer::new(flow.clone());
-    let hasty = analyst.clone().with_limit(|| ControlFlow::Break(()));
+    let hasty = analyst.clone().stopped_unless(|| false);
     let remembering = |analyst| CachingPreparer::new(analyst, CACHE_SIZE);
     (remembering(analyst), remembering(hasty))
 }

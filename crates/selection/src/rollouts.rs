@@ -1,6 +1,5 @@
 //! Rollouts: execution of a plan in samples of a world model.
 
-use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use elbowroom_execution::executors::{ExecutorSpec, PolicyTableCache};
@@ -85,7 +84,7 @@ pub struct RolloutSession<'a> {
     rollouts: Rollouts,
     task: Arc<Task>,
     planner: Box<dyn Planner + 'a>,
-    preparer: CachingPreparer<PlanPreparer>,
+    preparer: CachingPreparer<PlanPreparer<'static>>,
     foresight: PolicyTableCache,
 }
 
@@ -130,13 +129,8 @@ impl<'a> RolloutSession<'a> {
             }
         };
         let budget = work::Budget::new(work);
-        let analyst = PlanPreparer::new(rollouts.flow.clone()).with_limit(move || {
-            if budget.is_spent() {
-                ControlFlow::Break(())
-            } else {
-                ControlFlow::Continue(())
-            }
-        });
+        let analyst =
+            PlanPreparer::new(rollouts.flow.clone()).stopped_unless(move || !budget.is_spent());
         Self {
             planner,
             preparer: CachingPreparer::new(analyst, CACHE_SIZE),

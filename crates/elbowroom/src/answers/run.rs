@@ -102,6 +102,9 @@ pub fn run<'a>(
     if !execution.has_planner() {
         execution = execution.with_planner(inputs.planner(&clock, &may_continue)?);
     }
+    if !execution.has_preparer() {
+        execution = execution.with_preparer(inputs.preparer().stopped_unless(&may_continue));
+    }
     let report = execution
         .with_stop_check(|| matches!(shared.get().flow(), ControlFlow::Break(_)))
         .with_explanations()

@@ -300,7 +300,7 @@ fn ends_with_the_same_reason_are_grouped() {
 #[test]
 fn envelope_computed_in_mid_execution_can_be_interrupted() {
     let (task, plan) = read("delivery");
-    let prepared = |mut analyst: PlanPreparer| {
+    let prepared = |mut analyst: PlanPreparer<'static>| {
         let prepared = analyst.prepare(&task, &plan, PlanForm::Envelope);
         let envelope = prepared.expect("a valid plan").envelope;
         envelope.expect("it was asked for")

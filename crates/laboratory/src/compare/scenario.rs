@@ -22,12 +22,12 @@ use elbowroom::execute::{
 use elbowroom::mdp::Settings;
 
 /// Column for one problem.
-pub(super) struct Scenario {
+pub(super) struct Scenario<'a> {
     /// The world of the runs.
     pub(super) world: WorldModel,
     pub(super) likelihoods: Arc<Likelihoods>,
     pub(super) policy_tables: PolicyTableCache,
-    pub(super) preparer: CachingPreparer<PlanPreparer>,
+    pub(super) preparer: CachingPreparer<PlanPreparer<'a>>,
     /// Search for likelier plans, for executors that use it, and the same with a cache.
     pub(super) plan_comparator: SharedMostProbablePlanner,
     pub(super) comparing_planner: CachingPlanner<SharedMostProbablePlanner>,
@@ -43,13 +43,13 @@ pub(super) struct Scenario {
 impl Setting<'_> {
     /// Prepares a column, with the first plan of each executor. `first` is the experiment's plan or
     /// the planner's.
-    pub(super) fn prepare_scenario(
+    pub(super) fn prepare_scenario<'a>(
         &self,
         place: usize,
         task: &Arc<Task>,
         first: &TimeTriggeredPlan,
-        may_continue: &(dyn Fn() -> bool + Sync),
-    ) -> Result<Scenario, ExperimentError> {
+        may_continue: &'a (dyn Fn() -> bool + Sync),
+    ) -> Result<Scenario<'a>, ExperimentError> {
         let column = &self.experiment.columns[place];
         let happens = world(column, task)?;
         // The world that executors believe in.
@@ -63,7 +63,8 @@ impl Setting<'_> {
             }
         });
         let flow = self.flow(column, &world);
-        let mut preparer = CachingPreparer::new(PlanPreparer::new(flow), PREPARED_CACHE_SIZE);
+        let preparer = PlanPreparer::new(flow).stopped_unless(may_continue);
+        let mut preparer = CachingPreparer::new(preparer, PREPARED_CACHE_SIZE);
         for spec in &self.experiment.executors {
             preparer
                 .prepare(task, first, spec.needs().plan)

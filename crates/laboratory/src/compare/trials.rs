@@ -49,7 +49,7 @@ pub(crate) struct Setting<'a> {
 struct SharedSetup<'a> {
     task: Arc<Task>,
     planner: CachingPlanner<Box<dyn Planner + 'a>>,
-    columns: Vec<Scenario>,
+    columns: Vec<Scenario<'a>>,
 }
 
 impl Setting<'_> {

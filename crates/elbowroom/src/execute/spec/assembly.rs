@@ -254,7 +254,7 @@ impl RunInputs {
     }
 
     /// Returns the preparer of plans.
-    pub fn preparer(&self) -> PlanPreparer {
+    pub fn preparer(&self) -> PlanPreparer<'static> {
         PlanPreparer::new(self.envelopes())
     }
 

@@ -34,7 +34,7 @@ fn assembled_parts_are_send() {
     is_send::<(MostProbablePlanner<'static>, SharedMostProbablePlanner)>();
     is_send::<(
         CachingPlanner<Embedded<'static>>,
-        CachingPreparer<PlanPreparer>,
+        CachingPreparer<PlanPreparer<'static>>,
     )>();
     is_send::<(SimWorld<'static>, FaultInjector<SimWorld<'static>>)>();
     is_send::<(TraceWriter<'static>, Replay, ReplayWorld, ReplayPlanner)>();
