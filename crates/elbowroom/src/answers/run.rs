@@ -103,7 +103,7 @@ pub fn run<'a>(
         execution = execution.with_planner(inputs.planner(&clock, &may_continue)?);
     }
     if !execution.has_preparer() {
-        execution = execution.with_preparer(inputs.preparer().stopped_unless(&may_continue));
+        execution = execution.with_preparer(inputs.preparer().stopped_unless(may_continue));
     }
     let report = execution
         .with_stop_check(|| matches!(shared.get().flow(), ControlFlow::Break(_)))
