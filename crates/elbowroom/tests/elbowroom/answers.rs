@@ -310,7 +310,7 @@ fn envelope_computed_in_mid_execution_can_be_interrupted() {
         ..pipeline::Settings::default()
     });
     let whole = prepared(analyst.clone());
-    let cut = analyst.with_limit(|| ControlFlow::Break(()));
+    let cut = analyst.stopped_unless(|| false);
     let cut = prepared(cut);
     assert!(whole.includes(&cut) && whole != cut, "{cut:?}");
 }
