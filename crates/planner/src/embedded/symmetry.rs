@@ -69,7 +69,9 @@ impl Symmetry {
         is_timeless: bool,
         (steps, preferred): (&mut Vec<Step>, &mut Vec<Step>),
     ) {
-        for exchange in &self.exchanges {
+        // From the last object to the first one: the pairs form chains, and a preferred step moves
+        // along them to the one step that is left.
+        for exchange in self.exchanges.iter().rev() {
             if steps.len() < 2 {
                 break;
             }
