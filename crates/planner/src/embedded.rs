@@ -36,6 +36,7 @@ mod local_search;
 mod mutex;
 mod mutex_pairs;
 mod network;
+mod postponed_deadlines;
 mod relaxed;
 mod relevance;
 mod root;
@@ -67,6 +68,7 @@ pub use tuning::{Member, Technique, Tuning, TuningError};
 
 use compile::{CompileInput, Failure};
 use deadline_explanation::Names;
+use postponed_deadlines::Detours;
 use run::{Frame, Planner, none_found};
 use symmetry::Symmetry;
 
@@ -106,11 +108,27 @@ pub fn plan(
             if trajectory::is_responsible_for(task, situation, settings) {
                 trajectory::plan(task, situation, settings, observe)
             } else {
-                search_for_plans(task, None, situation, settings, observe)
+                search_with_detours(task, situation, settings, observe)
             }
         },
         |answer| answer.counts().map_or(0, |counts| counts.work),
     )
+}
+
+/// As [`plan`], for a task without trajectory constraints, with [detours](postponed_deadlines) if
+/// there are deadlines.
+fn search_with_detours(
+    task: &Task,
+    situation: &Situation,
+    settings: &Settings,
+    observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+) -> Answer {
+    let Some(mut detours) = Detours::new(task, situation, settings) else {
+        return search_for_plans(task, None, situation, settings, observe);
+    };
+    let mut report = |progress: &Progress| detours.observe(progress, observe);
+    let answer = search_for_plans(task, None, situation, settings, &mut report);
+    detours.answer(answer, observe)
 }
 
 /// As [`plan`], for a task without trajectory constraints. `constrained` is the
@@ -146,6 +164,24 @@ fn search_for_plans(
         } => (found, counts),
         answer => return answer,
     };
+    improve_on(
+        (task, constrained),
+        situation,
+        settings,
+        (found, counts),
+        observe,
+    )
+}
+
+/// Continues with a search that does not know the plan that was found, and reports better plans
+/// only. `counts` are those of the search that found it.
+fn improve_on(
+    (task, constrained): (&Task, Option<(&Task, &Situation)>),
+    situation: &Situation,
+    settings: &Settings,
+    (found, counts): (FoundPlan, Counts),
+    observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+) -> Answer {
     let is_better = |value: &Rational| *value < found.value;
     let mut report = |progress: &Progress| {
         let mut progress = progress.clone();

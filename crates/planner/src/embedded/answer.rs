@@ -2,7 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use elbowroom_model::TimeTriggeredPlan;
+use elbowroom_model::validate::Report;
+use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
 use super::compile::Unsupported;
@@ -129,6 +130,32 @@ pub struct FoundPlan {
     pub metric: Option<Rational>,
     /// The objective's value; smaller is better. Values to be maximized are negated.
     pub value: Rational,
+}
+
+impl FoundPlan {
+    /// Creates it from a plan of the task and the validator's report about it.
+    pub(super) fn new(
+        task: &Task,
+        objective: Objective,
+        plan: TimeTriggeredPlan,
+        verdict: &Report,
+    ) -> Self {
+        let makespan = verdict.makespan.clone();
+        let metric = verdict.metric(task);
+        let wanted = task.problem().metric.as_ref();
+        let is_maximized = wanted.is_some_and(|metric| metric.maximize);
+        let value = match (&metric, objective) {
+            (Some(metric), Objective::Metric) if is_maximized => -metric,
+            (Some(metric), Objective::Metric) => metric.clone(),
+            _ => makespan.clone(),
+        };
+        Self {
+            plan,
+            makespan,
+            metric,
+            value,
+        }
+    }
 }
 
 /// The answer to a planning problem.

@@ -63,6 +63,8 @@ pub enum Technique {
     /// If only a first plan is requested, better plans near it are searched for, for a share of its
     /// work.
     Cleanup,
+    /// With deadlines, plans without the last ones are improved until one is in time.
+    Detours,
     /// On a plateau, the newest and the oldest preferred successors alternate.
     Alternation,
 }
@@ -93,6 +95,7 @@ impl Technique {
         (Self::Repair, "repair"),
         (Self::Leniency, "leniency"),
         (Self::Cleanup, "cleanup"),
+        (Self::Detours, "detours"),
         (Self::Alternation, "alternation"),
     ];
 }
@@ -272,6 +275,11 @@ constants! {
     /// `first_round_work`: in turn and open, with up to 18,490 actions, a chronological search
     /// would take all the time.
     patience: u64 = 128;
+    /// Work without a plan, about a second, after which plans without the last deadlines are
+    /// improved until one is in time. The next such detour begins after four times as much. With
+    /// half of it, first plans of two of the problems of strangers that other searches find in
+    /// about a second take up to three.
+    detour_after: u64 = 1_000_000_000;
     /// Number of states of an incomplete search for each one of the complete search. Not measured;
     /// the complete search seldom finds a first plan, but is needed for proofs.
     incomplete_share: u64 = 8;

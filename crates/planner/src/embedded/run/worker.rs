@@ -8,7 +8,7 @@ use elbowroom_model::{Situation, Task, TimeTriggeredPlan, validate_from};
 use elbowroom_num::work;
 
 use super::super::action_elimination::without_redundant_actions;
-use super::super::answer::{Counts, FoundPlan, Objective, Phase, Settings};
+use super::super::answer::{Counts, FoundPlan, Phase, Settings};
 use super::super::apply::Step;
 use super::super::bound::MetricBound;
 use super::super::compile::Compiled;
@@ -415,21 +415,7 @@ impl<'a, 't> Worker<'a, 't> {
     }
 
     fn value(&self, plan: TimeTriggeredPlan, verdict: &validate::Report) -> FoundPlan {
-        let task = self.frame.task;
-        let makespan = verdict.makespan.clone();
-        let metric = verdict.metric(task);
-        let wanted = task.problem().metric.as_ref();
-        let is_maximized = wanted.is_some_and(|metric| metric.maximize);
-        let value = match (&metric, self.frame.settings.objective) {
-            (Some(metric), Objective::Metric) if is_maximized => -metric,
-            (Some(metric), Objective::Metric) => metric.clone(),
-            _ => makespan.clone(),
-        };
-        FoundPlan {
-            plan,
-            makespan,
-            metric,
-            value,
-        }
+        let Frame { task, settings, .. } = self.frame;
+        FoundPlan::new(task, settings.objective, plan, verdict)
     }
 }

@@ -188,6 +188,21 @@ fn answer_with(task: &Task, situation: &Situation, is_first: bool, as_windows: b
     if !as_windows {
         tuning.without.push(Technique::Calendars);
     }
+    answer_by(task, situation, is_first, tuning)
+}
+
+/// Returns the planner's answer within a limited number of reports, with a detour before anything
+/// else, or without detours.
+fn answer_by_detour(task: &Task, situation: &Situation, is_first: bool, detours: bool) -> Answer {
+    let mut tuning = Tuning::default();
+    tuning.detour_after = 0;
+    if !detours {
+        tuning.without.push(Technique::Detours);
+    }
+    answer_by(task, situation, is_first, tuning)
+}
+
+fn answer_by(task: &Task, situation: &Situation, is_first: bool, tuning: Tuning) -> Answer {
     let settings = Settings {
         first_plan_only: is_first,
         max_memory: 64 << 20,
@@ -298,6 +313,32 @@ proptest! {
             answer_with(&task, &situation, true, as_windows)
         });
         check_agreement(&task, &situation, &answers);
+    }
+
+    #[test]
+    fn detours_find_plans_of_the_problem(draft in drafts(), tenths in 20..60_i64) {
+        let task = draft.task();
+        let beginning = Situation::initial(&task);
+        let later = situation_of(&draft, &task, &Rational::new(tenths, 10));
+        for situation in [beginning, later] {
+            let answers = [true, false].map(|detours| {
+                answer_by_detour(&task, &situation, true, detours)
+            });
+            check_agreement(&task, &situation, &answers);
+            let best = [true, false].map(|detours| {
+                answer_by_detour(&task, &situation, false, detours)
+            });
+            check_agreement(&task, &situation, &best);
+            let ends = best.each_ref().map(|answer| match answer {
+                Answer::Plan { found, stopped: Stopped::Exhausted, .. } => {
+                    Some(found.makespan.clone())
+                }
+                _ => None,
+            });
+            if let [Some(with), Some(without)] = &ends {
+                prop_assert_eq!(with, without, "{}\n{}", describe(&best[0]), describe(&best[1]));
+            }
+        }
     }
 
     #[test]

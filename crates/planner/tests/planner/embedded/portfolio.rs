@@ -223,3 +223,119 @@ fn spreading_search_uses_idle_robots() {
         assert!((2..=4).contains(&looks), "{looks} of {robot}");
     }
 }
+
+/// Returns a problem with aircraft whose departure slots are short, and `crews` crews for all of
+/// them. One crew could serve them one after the other, but too late.
+fn turnaround(aircraft: usize, crews: usize) -> (String, String) {
+    let domain = "
+        (:requirements :typing :durative-actions :timed-initial-literals)
+        (:types aircraft crew)
+        (:predicates (free ?c - crew) (slot ?a - aircraft) (unloaded ?a - aircraft)
+          (cleaned ?a - aircraft) (boarded ?a - aircraft) (gone ?a - aircraft))
+        (:durative-action unload :parameters (?a - aircraft ?c - crew) :duration (= ?duration 10)
+          :condition (at start (free ?c))
+          :effect (and (at start (not (free ?c))) (at end (free ?c)) (at end (unloaded ?a))))
+        (:durative-action clean :parameters (?a - aircraft ?c - crew) :duration (= ?duration 12)
+          :condition (and (at start (free ?c)) (at start (unloaded ?a)))
+          :effect (and (at start (not (free ?c))) (at end (free ?c)) (at end (cleaned ?a))))
+        (:durative-action board :parameters (?a - aircraft ?c - crew) :duration (= ?duration 15)
+          :condition (and (at start (free ?c)) (at start (cleaned ?a)))
+          :effect (and (at start (not (free ?c))) (at end (free ?c)) (at end (boarded ?a))))
+        (:durative-action depart :parameters (?a - aircraft) :duration (= ?duration 5)
+          :condition (and (at start (boarded ?a)) (at start (slot ?a)))
+          :effect (at end (gone ?a)))";
+    let names: Vec<String> = (0..aircraft).map(|n| format!("a{n}")).collect();
+    let crews: Vec<String> = (0..crews).map(|n| format!("c{n}")).collect();
+    let mut init: String = crews.iter().map(|crew| format!("(free {crew})")).collect();
+    for (number, name) in names.iter().enumerate() {
+        let opens = 80 + 7 * number % 41;
+        let closes = opens + 40;
+        init += &format!("(at {opens} (slot {name})) (at {closes} (not (slot {name})))");
+    }
+    let goal: String = names.iter().map(|name| format!("(gone {name})")).collect();
+    let problem = format!(
+        "(:objects {} - aircraft {} - crew) (:init {init}) (:goal (and {goal}))",
+        names.join(" "),
+        crews.join(" "),
+    );
+    (domain.to_owned(), problem)
+}
+
+/// The relaxed plan gives the work to the last crew, and the search tries only the first one of the
+/// crews that are interchangeable.
+#[test]
+fn preferred_steps_are_kept_for_interchangeable_objects() {
+    let (domain, problem) = turnaround(12, 6);
+    let mut tuning = Tuning::default();
+    tuning.only = Some(Member::Spreading);
+    let answer = found(&domain, &problem, tuning, 500);
+    assert!(answer.found().is_some(), "{}", describe(&answer));
+}
+
+/// Returns a problem with satellites that take an image, and send it during a pass over a station
+/// before they take another one. All images are to be sent by `horizon`.
+fn passes(satellites: usize, images: usize, horizon: usize) -> (String, String) {
+    let domain = "
+        (:requirements :typing :durative-actions :timed-initial-literals)
+        (:types sat target image)
+        (:predicates (pointing ?s - sat ?t - target) (idle ?s - sat) (of ?i - image ?t - target)
+          (empty ?s - sat) (holds ?s - sat ?i - image) (visible ?s - sat) (antenna)
+          (sent ?i - image) (open))
+        (:durative-action turn :parameters (?s - sat ?a ?b - target) :duration (= ?duration 4)
+          :condition (and (at start (idle ?s)) (at start (pointing ?s ?a)))
+          :effect (and (at start (not (idle ?s))) (at start (not (pointing ?s ?a)))
+                       (at end (idle ?s)) (at end (pointing ?s ?b))))
+        (:durative-action take :parameters (?s - sat ?i - image ?t - target)
+          :duration (= ?duration 3)
+          :condition (and (at start (idle ?s)) (over all (pointing ?s ?t))
+                          (at start (of ?i ?t)) (at start (empty ?s)))
+          :effect (and (at start (not (idle ?s))) (at start (not (empty ?s)))
+                       (at end (idle ?s)) (at end (holds ?s ?i))))
+        (:durative-action send :parameters (?s - sat ?i - image) :duration (= ?duration 4)
+          :condition (and (at start (holds ?s ?i)) (at start (antenna)) (over all (visible ?s))
+                          (at end (open)))
+          :effect (and (at start (not (antenna))) (at start (not (holds ?s ?i)))
+                       (at end (antenna)) (at end (empty ?s)) (at end (sent ?i))))";
+    let targets = 6;
+    let list = |kind: char, count: usize| (0..count).map(|n| format!("{kind}{n} ")).collect();
+    let lists: [String; 3] = [list('s', satellites), list('t', targets), list('i', images)];
+    let [sats, places, pictures] = lists;
+    let mut init = String::from("(antenna) (open)");
+    for sat in 0..satellites {
+        init += &format!("(pointing s{sat} t0) (idle s{sat}) (empty s{sat})");
+        for pass in 0..10 {
+            let opens = 6 + 5 * sat + 30 * pass;
+            let closes = opens + 9;
+            init += &format!("(at {opens} (visible s{sat})) (at {closes} (not (visible s{sat})))");
+        }
+    }
+    for image in 0..images {
+        init += &format!("(of i{image} t{})", image * 5 % targets);
+    }
+    init += &format!("(at {horizon} (not (open)))");
+    let goal: String = (0..images)
+        .map(|image| format!("(sent i{image})"))
+        .collect();
+    let problem = format!(
+        "(:objects {sats}- sat {places}- target {pictures}- image) (:init {init})
+         (:goal (and {goal}))"
+    );
+    (domain.to_owned(), problem)
+}
+
+/// Best-first search revises the last choices only; plans without the horizon become shorter as a
+/// whole.
+#[test]
+fn detour_meets_tight_horizon() {
+    let (domain, problem) = passes(4, 14, 140);
+    let answers = [true, false].map(|detours| {
+        let mut tuning = Tuning::default();
+        tuning.detour_after = 500_000_000;
+        if !detours {
+            tuning.without.push(Technique::Detours);
+        }
+        found(&domain, &problem, tuning, 25_000)
+    });
+    assert!(answers[0].found().is_some(), "{}", describe(&answers[0]));
+    assert!(answers[1].found().is_none(), "{}", describe(&answers[1]));
+}
