@@ -4,6 +4,7 @@ mod calendar;
 mod compare;
 mod envelope;
 mod export;
+mod init;
 mod learn;
 mod network;
 mod number;
@@ -25,6 +26,7 @@ pub(crate) use calendar::CalendarArgs;
 pub(crate) use compare::CompareArgs;
 pub(crate) use envelope::{EnvelopeArgs, Growth, Order, controllable};
 pub(crate) use export::{Bound, ExportArgs, ExportFormat};
+pub(crate) use init::{InitArgs, Template};
 pub(crate) use learn::LearnArgs;
 pub(crate) use network::{DurationsChoice, NetworkArgs};
 use number::{positive, positive_or_zero};
@@ -116,6 +118,8 @@ const VAL_TOLERANCE: &str = "0.01";
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
+    /// Create a project to start from: domain, problem, plan, world, robot program and experiment
+    Init(InitArgs),
     /// Validate a plan, and report its errors
     Check(CheckArgs),
     /// Find a plan, with the embedded planner or another one
@@ -172,7 +176,8 @@ impl Command {
             Self::Odds(arguments) => arguments.json,
             Self::Network(arguments) => arguments.json,
             Self::Verify(arguments) => arguments.json,
-            Self::Export(_)
+            Self::Init(_)
+            | Self::Export(_)
             | Self::Val(_)
             | Self::Report(_)
             | Self::Completions(_)

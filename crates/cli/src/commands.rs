@@ -6,6 +6,7 @@ pub(crate) mod completions;
 pub(crate) mod ctl;
 pub(crate) mod envelope;
 pub(crate) mod export;
+pub(crate) mod init;
 pub(crate) mod learn;
 pub(crate) mod network;
 pub(crate) mod odds;

@@ -37,6 +37,7 @@ pub fn run(line: Vec<OsString>) -> u8 {
     let as_json = command.is_json();
     let mut output = Output::default();
     let answer = match command {
+        Command::Init(arguments) => commands::init::run(&arguments),
         Command::Check(arguments) => commands::check::run(&arguments, &mut output),
         Command::Plan(arguments) => commands::plan::run(&arguments, &mut output),
         Command::Stn(arguments) => commands::stn::run(&arguments, &mut output),

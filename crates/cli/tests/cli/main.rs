@@ -8,6 +8,7 @@ mod complaints;
 mod executive;
 mod far_limits;
 mod help;
+mod init;
 mod interrupt;
 mod judged_only;
 mod kills;
