@@ -3,7 +3,7 @@
 
 Put `clients/python/elbowroom_world.py` beside this file, and start it where ROS 2 and your `plansys2_msgs` are set up.
 PlanSys2's own executor must be off, because two executors would both answer. A second world of Elbowroom does not start
-unless `--shared` is given. docs/plansys2.md has the details.
+unless `--shared` is given. docs/reference/plansys2.md has the details.
 
 `Hub` implements the protocol on PlanSys2's topic `actions_hub` without ROS, so that it can be tested anywhere. `main`
 connects it with rclpy.

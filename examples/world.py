@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """A world for `elbowroom run --world-process "python3 examples/world.py"`: each action takes 10 %
-longer than planned. docs/formats/world-protocol.md describes the messages."""
+longer than planned. docs/reference/formats/world-protocol.md describes the messages."""
 import json
 import sys
 

@@ -37,7 +37,7 @@ Three kinds of actions, told apart by how they are registered:
 NAME ``"*"`` stands for every action that has no function of its own.
 
 Whatever a program prints goes to standard error, so that ``print`` does not disturb the
-conversation. `docs/formats/world-protocol.md` describes the messages.
+conversation. `docs/reference/formats/world-protocol.md` describes the messages.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
     python3 testing/day/day.py target/release/elbowroom [--hours 8] [--speed 50] [--seed 1] [--short]
 
-docs/day.md describes the day and its figures. Exit code 1: a promise of the executive was broken; the reasons are
+docs/research/day.md describes the day and its figures. Exit code 1: a promise of the executive was broken; the reasons are
 printed. Standard library only.
 """
 

@@ -88,9 +88,9 @@ def documents_and_contract() -> None:
     """The document of executors is out of date until it is generated again; the contract test covers the executor."""
     tests = ("test", "--test", "execution", "--")
     stale = cargo(*tests, "executors_page")
-    check(stale.returncode != 0 and "docs/executors.md is out of date" in stale.stdout, "the check of the documents")
+    check(stale.returncode != 0 and "docs/reference/executors.md is out of date" in stale.stdout, "the check of the documents")
     built(*tests, "executors_page", ELBOWROOM_UPDATE_DOCS="1")
-    page = (COPY / "docs/executors.md").read_text(encoding="utf-8")
+    page = (COPY / "docs/reference/executors.md").read_text(encoding="utf-8")
     check("### `drill`" in page and "| `drill` | partial order |  | yes | yes |" in page, "the documents")
     built(*tests)
     own = COPY / EXECUTORS / "drill.rs"
@@ -173,7 +173,7 @@ def nothing_else_changed() -> None:
             own = ROOT / path.relative_to(COPY)
             if not own.is_file() or own.read_bytes() != path.read_bytes():
                 changed.add(str(path.relative_to(COPY)))
-    allowed = {f"{EXECUTORS}.rs", f"{EXECUTORS}/drill.rs", "docs/executors.md"}
+    allowed = {f"{EXECUTORS}.rs", f"{EXECUTORS}/drill.rs", "docs/reference/executors.md"}
     if changed != allowed:
         sys.exit(f"drill: other files were changed: {sorted(changed - allowed)}")
 

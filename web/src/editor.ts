@@ -2,7 +2,7 @@
 
 import { stretches, type Stretch } from "./highlight";
 
-/** What is remarked on a text: docs/formats/diagnostics.md. */
+/** What is remarked on a text: docs/reference/formats/diagnostics.md. */
 export interface Finding {
   severity: string;
   message: string;

@@ -1,4 +1,4 @@
-// The library as a WebAssembly module: docs/web.md describes its interface.
+// The library as a WebAssembly module: docs/reference/web.md describes its interface.
 
 /** What the library replies. */
 export interface Reply {

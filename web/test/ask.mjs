@@ -1,4 +1,4 @@
-// Asks the module, as docs/web.md says.
+// Asks the module, as docs/reference/web.md says.
 
 export const asker = (library) => (question) => {
   const asked = new TextEncoder().encode(JSON.stringify(question));

@@ -1,7 +1,7 @@
 //! Calendar files: dates, time zones and recurring windows ("weekdays 8 to 17"), mapped to timed
 //! initials of a planning problem.
 //!
-//! In: a calendar file (`docs/calendars.md`), the problem that it is about, and an [`Origin`]. Out: a
+//! In: a calendar file (`docs/reference/calendars.md`), the problem that it is about, and an [`Origin`]. Out: a
 //! [`Calendar`], which writes the problem with its timed initials ([`Calendar::timed_problem`]) and
 //! the dates of a plan ([`Calendar::dated_plan`]).
 //!

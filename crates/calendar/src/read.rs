@@ -18,7 +18,7 @@ use crate::{Calendar, Origin};
 /// Text that stands for the current time.
 const NOW: &str = "now";
 
-/// Reads a calendar file (`docs/calendars.md`) for a problem. Returns the calendar with the warnings.
+/// Reads a calendar file (`docs/reference/calendars.md`) for a problem. Returns the calendar with the warnings.
 ///
 /// # Errors
 /// All mistakes found: of syntax, of names, dates and windows, and facts that the problem sets itself.

@@ -209,7 +209,7 @@ pub(crate) struct ValArgs {
 #[derive(Args, Debug)]
 #[command(after_help = "\
 The page is one HTML file that needs no network. It shows the plan with its envelope, the run \
-next to its plan, or the rates of the experiment; docs/pages.md describes it.")]
+next to its plan, or the rates of the experiment; docs/reference/pages.md describes it.")]
 pub(crate) struct ReportArgs {
     /// The trace of a run (`run --trace`), an answer (`envelope --json`, `plan --json`, `run
     /// --json`), the results of an experiment (`results.json`), or the folder that contains them
@@ -231,8 +231,8 @@ pub(crate) struct ReportArgs {
 
 #[derive(Args, Debug)]
 #[command(after_help = "\
-Scope of the check: docs/largest-box.md; certificates: docs/formats/certificate.md; proofs that \
-no plan exists: docs/formats/no-plan.md.")]
+Scope of the check: docs/reference/largest-box.md; certificates: docs/reference/formats/certificate.md; proofs that \
+no plan exists: docs/reference/formats/no-plan.md.")]
 pub(crate) struct VerifyArgs {
     /// Output of `elbowroom envelope --method best --json`, or of `elbowroom plan --json` if no
     /// plan exists
@@ -249,7 +249,7 @@ pub(crate) struct VerifyArgs {
     #[arg(value_name = "PLAN")]
     pub(crate) plan: Option<PathBuf>,
     /// For a box of --objective probability: the world file that it was computed with, to check its
-    /// probability (docs/formats/world.md)
+    /// probability (docs/reference/formats/world.md)
     #[arg(long, value_name = "WORLD.toml", requires = "plan")]
     pub(crate) world: Option<PathBuf>,
     /// Print the verdict as one JSON document

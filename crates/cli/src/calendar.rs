@@ -1,4 +1,4 @@
-//! Problems with a calendar file: `docs/calendars.md`.
+//! Problems with a calendar file: `docs/reference/calendars.md`.
 
 use elbowroom::execute::NamedText;
 use elbowroom::num::Rational;

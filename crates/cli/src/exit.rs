@@ -1,4 +1,4 @@
-//! Exit codes and failures of the command: `docs/exit-codes.md`.
+//! Exit codes and failures of the command: `docs/reference/exit-codes.md`.
 
 use std::fmt::{self, Write as _};
 
@@ -41,7 +41,7 @@ pub(crate) struct Failure {
 /// Result of a command whose answer is already printed, or its failure.
 pub(crate) type Answer = Result<Exit, Failure>;
 
-/// A failure as a document: `docs/formats/diagnostics.md`.
+/// A failure as a document: `docs/reference/formats/diagnostics.md`.
 #[derive(Serialize)]
 pub(crate) struct FailureDocument<'a> {
     format: &'static str,

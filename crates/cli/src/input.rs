@@ -135,7 +135,8 @@ pub(crate) fn record(path: &Path, what: &str) -> Result<Source, Failure> {
 pub(crate) fn world(path: &Path, task: &Task) -> Result<WorldModel, Failure> {
     let text = source(path, "world")?;
     WorldModel::read(&text, task.problem()).map_err(|wrong| {
-        Failure::from(wrong).with_default_advice("docs/formats/world.md describes world files")
+        Failure::from(wrong)
+            .with_default_advice("docs/reference/formats/world.md describes world files")
     })
 }
 

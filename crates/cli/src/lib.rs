@@ -1,6 +1,6 @@
 //! The command `elbowroom`: robustness envelopes, execution and validation of temporal plans.
 //!
-//! The output streams and exit codes are a stable interface, see `docs/exit-codes.md`. This crate is
+//! The output streams and exit codes are a stable interface, see `docs/reference/exit-codes.md`. This crate is
 //! the only one that prints. The library does the computations, and `elbowroom-executive` executes
 //! plans.
 

@@ -1,4 +1,4 @@
-//! Runs the transcripts in `tests/cmd` and `docs/calendars.md`, which document the command.
+//! Runs the transcripts in `tests/cmd` and `docs/reference/calendars.md`, which document the command.
 //!
 //! A separate program, because it changes the current directory, which all tests of a program
 //! share.
@@ -15,5 +15,5 @@ fn transcripts_match_the_command() {
         .env("NO_COLOR", "1")
         .env("LC_ALL", "C")
         .case("crates/cli/tests/cmd/*.md")
-        .case("docs/calendars.md");
+        .case("docs/reference/calendars.md");
 }

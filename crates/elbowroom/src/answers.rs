@@ -1,7 +1,7 @@
 //! Requests about plans and their answers.
 //!
 //! An answer is plain data. It can be serialized with `serde`; its JSON is the document that
-//! `docs/formats` describes and that the command line prints. The front ends (the command, other
+//! `docs/reference/formats` describes and that the command line prints. The front ends (the command, other
 //! languages, reports) differ only in how they show it.
 //!
 //! A request that can take long is given an [`Observer`], which receives progress events and can end

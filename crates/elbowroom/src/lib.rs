@@ -121,7 +121,7 @@
 //!
 //! The [`tutorial`] goes through planning, envelopes, execution and probability. Each question of
 //! the command line is a request with an answer in [`answers`]; an answer is plain data, and its
-//! JSON is the document that `docs/formats` describes.
+//! JSON is the document that `docs/reference/formats` describes.
 //!
 //! - [`answers`]: the questions of the command line as requests, with progress and cancelling.
 //! - [`pipeline`]: from a plan to its envelope in one call or step by step.

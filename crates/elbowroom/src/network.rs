@@ -2,7 +2,7 @@
 //! dispatch.
 //!
 //! [`read()`] reads a file in any known format. [`analyze`] answers a [`Request`] about it with an
-//! [`Answer`], which can be serialized as JSON (`docs/formats/network.md`).
+//! [`Answer`], which can be serialized as JSON (`docs/reference/formats/network.md`).
 //!
 //! ```
 //! use elbowroom::network::{Request, Verdict, analyze, read};

@@ -6,7 +6,7 @@
 //! printed numbers by at most one unit of the last printed digit, and by at most 0.001; or by at
 //! most the tolerance that the user gives. Happenings that interfere keep their printed order.
 //! Without such a plan, the numbers of the text are taken as they are, and the verdict is the
-//! validator's. Every command that reads a plan reads it by this rule; `docs/formats/plan.md`
+//! validator's. Every command that reads a plan reads it by this rule; `docs/reference/formats/plan.md`
 //! states it for users.
 
 use elbowroom_model::problem::Comparison;

@@ -1,7 +1,7 @@
 //! The executors: one file each, and the list of all.
 //!
 //! To add one, write a file with its [`Executor`] and its [`ExecutorEntry`] entry, and add a line to
-//! [`EXECUTORS`]. The command line, its help, `docs/executors.md` and the captions of reports are
+//! [`EXECUTORS`]. The command line, its help, `docs/reference/executors.md` and the captions of reports are
 //! generated from that list.
 
 mod adaptable;
@@ -34,7 +34,7 @@ use crate::reason::{Cause, Reason, Subject};
 use crate::rollout::RolloutEvaluator;
 
 /// The default executor. It abandons a plan only if the remaining plan fails even when executed
-/// nominally; `docs/executors.md` compares it with the baselines.
+/// nominally; `docs/reference/executors.md` compares it with the baselines.
 pub const DEFAULT_EXECUTOR: &str = live::REGISTERED.name;
 
 /// All executors, in the order used by help and reports.

@@ -1,4 +1,4 @@
-//! HTTP interface of an executive: `docs/serve.md`.
+//! HTTP interface of an executive: `docs/reference/serve.md`.
 
 mod initial_problem;
 mod monitoring;

@@ -1,4 +1,4 @@
-//! Changes of the belief state for a world that is a process: `docs/formats/world-protocol.md`.
+//! Changes of the belief state for a world that is a process: `docs/reference/formats/world-protocol.md`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

@@ -1,4 +1,4 @@
-//! Interface of an executive to its clients: the documents of `elbowroom serve`, `docs/serve.md`.
+//! Interface of an executive to its clients: the documents of `elbowroom serve`, `docs/reference/serve.md`.
 //!
 //! - [`documents`]: requests and responses as types.
 //! - [`Status`]: follows a run by its record, and answers requests at any time without accessing

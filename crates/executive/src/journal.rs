@@ -1,4 +1,4 @@
-//! Journals: traces that survive a crash of the program, `docs/formats/journal.md`.
+//! Journals: traces that survive a crash of the program, `docs/reference/formats/journal.md`.
 //!
 //! A record is a line of a trace, preceded by eight hexadecimal digits and a space. The digits are the CRC-32 of
 //! the digits of the previous record (zeros for the first) and of the line, so that a damaged, missing or

@@ -1,4 +1,4 @@
-//! Learning from the journal of an executive between its missions: `docs/learning.md`.
+//! Learning from the journal of an executive between its missions: `docs/reference/learning.md`.
 //!
 //! A folder contains copies of journals, one for each segment, and `world.toml`, the model of the world learnt from all
 //! of them.

@@ -5,16 +5,16 @@
 //! resumes its run after a crash. The parts below are for programs that assemble a run themselves.
 //!
 //! - [`journal`], [`journaling`]: append-only record of a run that survives a crash
-//!   (`docs/formats/journal.md`), and the recorder and the world decorator that write it before
+//!   (`docs/reference/formats/journal.md`), and the recorder and the world decorator that write it before
 //!   each command is sent.
 //! - [`request_queue`], [`operator`]: bounded queue of operators' requests, and the world decorator that adds them to
 //!   the observations of the run.
 //! - [`background_planner`], [`background_preparer`], [`completion_signal`]: planning during the run.
 //! - [`process_world`], [`world_protocol`], [`belief_updates`]: a world that is a process
-//!   (`docs/formats/world-protocol.md`). [`world_check`]: conformance test of such a world. [`realtime`]: a simulated world on the wall clock.
+//!   (`docs/reference/formats/world-protocol.md`). [`world_check`]: conformance test of such a world. [`realtime`]: a simulated world on the wall clock.
 //! - [`run`], [`resume`]: assembly of a run from its specification, and recovery from its journal.
 //! - [`EmbeddedWorld`]: a world that is an object in the process of its executive.
-//! - [`http`], [`api`], [`trace_buffer`]: HTTP server and client, the interface of an executive (`docs/serve.md`), and
+//! - [`http`], [`api`], [`trace_buffer`]: HTTP server and client, the interface of an executive (`docs/reference/serve.md`), and
 //!   the buffer of the trace for clients.
 //! - [`interface`]: the requests and responses of an executive as types, its `OpenAPI` document, and the state of a
 //!   run for clients.

@@ -1,4 +1,4 @@
-//! World that is a process: `docs/formats/world-protocol.md`.
+//! World that is a process: `docs/reference/formats/world-protocol.md`.
 
 use std::process::Child;
 use std::sync::Arc;
@@ -321,7 +321,7 @@ pub fn check_program(command: &str) -> Result<(), Error> {
 fn cannot_start(command: &str, why: &str) -> Error {
     Error::new(
         format!("cannot start the world `{command}`: {why}"),
-        "give a program and its arguments, separated by spaces; docs/formats/world-protocol.md documents the protocol",
+        "give a program and its arguments, separated by spaces; docs/reference/formats/world-protocol.md documents the protocol",
     )
 }
 

@@ -2,7 +2,7 @@
 //!
 //! All decisions of a run follow from the reports of the world and the answers of the planner, which the journal
 //! contains. So the run is replayed to the end of the journal without a message to the world; then the world itself
-//! is started again. `docs/formats/journal.md` has the rules for actions that were running.
+//! is started again. `docs/reference/formats/journal.md` has the rules for actions that were running.
 
 mod elapsed;
 mod journal_replay;

@@ -1,4 +1,4 @@
-//! Protocol of worlds that are processes: `docs/formats/world-protocol.md`.
+//! Protocol of worlds that are processes: `docs/reference/formats/world-protocol.md`.
 
 mod belief_message;
 mod clock_sync;

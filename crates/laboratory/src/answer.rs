@@ -20,9 +20,9 @@ use crate::trials::{self, Monitor, Part, Trials as _};
 /// Experiment of either kind.
 #[derive(Clone, Debug)]
 pub enum AnyExperiment {
-    /// On a clock: `docs/formats/experiment.md`.
+    /// On a clock: `docs/reference/formats/experiment.md`.
     Timed(Box<Experiment>),
-    /// In worlds without time: `docs/perturbed-worlds.md`.
+    /// In worlds without time: `docs/research/perturbed-worlds.md`.
     Untimed(Box<PerturbedExperiment>),
 }
 
@@ -35,7 +35,7 @@ pub struct CompareRequest<'a> {
     pub part: Part,
 }
 
-/// Results of an experiment: `docs/formats/results-json.md`.
+/// Results of an experiment: `docs/reference/formats/results-json.md`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum CompareAnswer {
@@ -104,8 +104,8 @@ impl AnyExperiment {
         }
     }
 
-    /// Repeats trials for their traces (`docs/formats/trace.md`) or, in worlds without time, their
-    /// courses (`docs/formats/course.md`).
+    /// Repeats trials for their traces (`docs/reference/formats/trace.md`) or, in worlds without time, their
+    /// courses (`docs/reference/formats/course.md`).
     ///
     /// # Errors
     /// There is no such trial.

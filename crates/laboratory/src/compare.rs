@@ -1,6 +1,6 @@
 //! Comparison of executors in many runs: the papers' tables.
 //!
-//! An [`Experiment`] is a file (`docs/formats/experiment.md`): a problem with blanks and their
+//! An [`Experiment`] is a file (`docs/reference/formats/experiment.md`): a problem with blanks and their
 //! values, columns (worlds and parameters), and executors. [`run`] runs every trial with every
 //! executor in the same world (common random numbers), so that differences between executors are
 //! not random. Trials run in parallel. The results do not depend on the number of threads, and the
@@ -42,7 +42,7 @@ pub fn run(
     crate::trials::run(experiment, part, &Monitor::new(observe, None))
 }
 
-/// Repeats one trial of an executor in a column. Returns its trace (`docs/formats/trace.md`), which
+/// Repeats one trial of an executor in a column. Returns its trace (`docs/reference/formats/trace.md`), which
 /// `elbowroom run --replay` plays and `elbowroom report` shows.
 ///
 /// # Errors

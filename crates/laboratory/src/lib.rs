@@ -10,9 +10,9 @@
 //! - [`results`]: the results of either kind, and the sum of parts.
 //! - [`failures`]: failed trials by kind, each with an example.
 //! - [`error`]: errors of both kinds.
-//! - [`compare`]: temporal execution (`docs/experiments.md`).
+//! - [`compare`]: temporal execution (`docs/research/experiments.md`).
 //! - [`perturbed`]: worlds without time, in which starts and effects fail and facts change
-//!   spontaneously (`docs/perturbed-worlds.md`); the experiments of paper 2.
+//!   spontaneously (`docs/research/perturbed-worlds.md`); the experiments of paper 2.
 //! - [`record`]: the result of each trial, as a table for other programs.
 //! - [`untimed`]: executors for worlds without time, and the rules of a trial.
 //! - [`worlds`]: worlds without time.

@@ -135,7 +135,7 @@ fn rows(
 }
 
 /// Repeats trials, each given by its row in the results and its number, and records their steps:
-/// `docs/formats/course.md`.
+/// `docs/reference/formats/course.md`.
 ///
 /// # Errors
 /// There is no such row, or as for [`run`].

@@ -22,7 +22,7 @@ pub struct TrialRecord {
     pub column: String,
     /// The executor.
     pub executor: String,
-    /// Verdict: `goal-reached`, or another word of `docs/formats/run-json.md`; in experiments
+    /// Verdict: `goal-reached`, or another word of `docs/reference/formats/run-json.md`; in experiments
     /// without time, `goal-reached` or `failed`.
     pub verdict: String,
     /// Time of the world at the end, in seconds; `None` in experiments without time.

@@ -8,7 +8,7 @@ use serde_json::{Map, Value};
 
 use crate::error::ExperimentError;
 
-/// Results of an experiment, or of parts of it: `docs/formats/results-json.md`.
+/// Results of an experiment, or of parts of it: `docs/reference/formats/results-json.md`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Results<C> {
     /// The experiment and its parts.

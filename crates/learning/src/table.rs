@@ -1,4 +1,4 @@
-//! Logs as tables: CSV with a header, one attempt per row (`docs/formats/log-csv.md`).
+//! Logs as tables: CSV with a header, one attempt per row (`docs/reference/formats/log-csv.md`).
 
 use elbowroom_text::{Diagnostic, Diagnostics, Report, Severity, Source, Span, nearest};
 

@@ -1,4 +1,4 @@
-//! Learnt model as a world file (`docs/formats/world.md`).
+//! Learnt model as a world file (`docs/reference/formats/world.md`).
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;

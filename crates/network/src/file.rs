@@ -19,7 +19,7 @@ pub enum Format {
     Dimacs,
     /// For each node, a list of inequalities, in JSON.
     Inequalities,
-    /// Elbowroom's own JSON format (`docs/formats/network.md`).
+    /// Elbowroom's own JSON format (`docs/reference/formats/network.md`).
     Elbowroom,
 }
 

@@ -7,7 +7,7 @@ use elbowroom_stn::uncertain::ContingentLink;
 
 use crate::file::{Duration, NetworkFile};
 
-/// Writes a network in JSON (`docs/formats/network.md`). Nothing is lost.
+/// Writes a network in JSON (`docs/reference/formats/network.md`). Nothing is lost.
 pub fn write_json(file: &NetworkFile) -> String {
     let mut text = String::from("{\n  \"format\": \"elbowroom-network\",\n  \"version\": 1,\n");
     // Writing to a string cannot fail.

@@ -14,7 +14,7 @@
 //! [`Claim`] keeps two executors from using the same performers.
 //!
 //! The library has no clock, no thread and no socket: time is an argument, and messages are return
-//! values. `docs/plansys2.md` has the table of events and reactions. Each row is a test, and the
+//! values. `docs/reference/plansys2.md` has the table of events and reactions. Each row is a test, and the
 //! same scripts are played to the `Hub` of `examples/plansys2_world.py`, which must react in the
 //! same way.
 //!

@@ -15,7 +15,7 @@
 //! 7. [`optimum`]: the best that any executor can reach in a small world, and its
 //!    [`optimum::PolicyTable`].
 //!
-//! `docs/probability.md` defines the computed values and explains why they are exact. The crate uses
+//! `docs/research/probability.md` defines the computed values and explains why they are exact. The crate uses
 //! no random numbers and no clock: time limits are callbacks, and the same input gives the same
 //! result. Probabilities are `f64`. The temporal feasibility of an order is decided by the exact
 //! temporal network.

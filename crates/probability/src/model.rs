@@ -1,6 +1,6 @@
 //! A plan's happenings as steps of a stochastic process: [`Model`].
 //!
-//! `docs/probability.md` defines the process. The model numbers facts and changing fluents densely,
+//! `docs/research/probability.md` defines the process. The model numbers facts and changing fluents densely,
 //! splits conditions into parts, and assigns a probability to each effect.
 //! [`PrunedNetwork`](crate::PrunedNetwork) computes with these probabilities.
 

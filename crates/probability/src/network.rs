@@ -85,7 +85,7 @@ impl<'a> Happenings<'a> {
 ///
 /// [`PrunedNetwork::push`] adds a happening and [`PrunedNetwork::pop`] removes the last one. Both
 /// take time proportional to the number of facts and numbers that the happening reads and writes,
-/// independent of the length of the order. `docs/probability.md` defines the computed values and
+/// independent of the length of the order. `docs/research/probability.md` defines the computed values and
 /// explains why they are exact.
 #[derive(Clone, Debug)]
 pub struct PrunedNetwork<'m> {

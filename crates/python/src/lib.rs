@@ -1,7 +1,7 @@
 //! The native module of the Python package `elbowroom`.
 //!
 //! Arguments and results are texts: PDDL, plans, options as JSON, and the answers of
-//! [`elbowroom::answers`] as the JSON documents described in `docs/formats`. The Python side
+//! [`elbowroom::answers`] as the JSON documents described in `docs/reference/formats`. The Python side
 //! (`crates/python/python/elbowroom`) converts them to objects with exact fractions, and computes
 //! no part of an answer. The answer is therefore identical, byte for byte, to that of the command.
 //!

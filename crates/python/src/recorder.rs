@@ -9,7 +9,7 @@ use elbowroom::report::trace::TraceWriter;
 
 use crate::errors::CallError;
 
-/// A trace as text: `docs/formats/trace.md`.
+/// A trace as text: `docs/reference/formats/trace.md`.
 #[derive(Clone)]
 pub(crate) struct TraceText {
     task: Arc<Task>,

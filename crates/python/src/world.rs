@@ -14,7 +14,7 @@ use pyo3::prelude::*;
 use serde_json::Value;
 
 /// World whose Python side (`elbowroom._world`) exchanges the messages of
-/// `docs/formats/world-protocol.md`.
+/// `docs/reference/formats/world-protocol.md`.
 pub(crate) struct PyWorld {
     adapter: Py<PyAny>,
     task: Arc<Task>,

@@ -1,4 +1,4 @@
-"""Prints the table of docs/python.md: unified-planning's own test cases, for several engines.
+"""Prints the table of docs/reference/python.md: unified-planning's own test cases, for several engines.
 
     python crates/python/tests/conformance.py [SECONDS]
 

@@ -1,4 +1,4 @@
-"""Measures what docs/python.md claims: measure.py [up|world]."""
+"""Measures what docs/reference/python.md claims: measure.py [up|world]."""
 
 from __future__ import annotations
 

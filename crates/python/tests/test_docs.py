@@ -1,4 +1,4 @@
-"""The example of a stepped world in docs/python.md is run."""
+"""The example of a stepped world in docs/reference/python.md is run."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import elbowroom
 
 
 def test_stepped_world_of_the_documentation_runs(problem: elbowroom.Problem, plan: Path) -> None:
-    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "python.md").read_text(), re.DOTALL)
+    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "reference" / "python.md").read_text(), re.DOTALL)
     (example,) = (block for block in blocks if "SteppedWorld" in block)
     names = {"problem": problem, "plan": plan}
     exec(example, names)

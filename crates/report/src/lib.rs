@@ -1,10 +1,10 @@
 //! Records of runs: traces, statistics, tables and plots. Text in and out; no files.
 //!
-//! - [`trace`]: the record of a run as JSON Lines (`docs/formats/trace.md`), and a world that plays
+//! - [`trace`]: the record of a run as JSON Lines (`docs/reference/formats/trace.md`), and a world that plays
 //!   a stored one back.
 //! - [`validation`]: validation of a recorded run, entry by entry.
 //! - [`wire`]: commands and observations as JSON, for traces and for worlds that are processes
-//!   (`docs/formats/world-protocol.md`).
+//!   (`docs/reference/formats/world-protocol.md`).
 //! - [`exact`]: exact numbers in JSON.
 //! - [`statistics`]: proportions with Wilson's intervals, means.
 //! - [`table`]: tables as Markdown, CSV, or text for a terminal.

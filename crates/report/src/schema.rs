@@ -1,4 +1,4 @@
-//! Lines of a trace, for writers and readers: `docs/formats/trace.md`.
+//! Lines of a trace, for writers and readers: `docs/reference/formats/trace.md`.
 
 use elbowroom_num::Rational;
 use indexmap::IndexMap;

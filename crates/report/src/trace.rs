@@ -1,4 +1,4 @@
-//! Record of a run as JSON Lines: `docs/formats/trace.md`.
+//! Record of a run as JSON Lines: `docs/reference/formats/trace.md`.
 //!
 //! A trace contains all external input of the run: the reports of the world and the plans of the
 //! planner. They determine everything else, and a [`Replay`] checks that.

@@ -1,6 +1,6 @@
 //! Seeded worlds to execute plans in.
 //!
-//! In: a world file (`docs/formats/world.md`) and a seed. Out: a
+//! In: a world file (`docs/reference/formats/world.md`) and a seed. Out: a
 //! [`World`](elbowroom_execution::World) that executes commands with durations and failures of its
 //! own.
 //!

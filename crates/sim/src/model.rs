@@ -1,4 +1,4 @@
-//! Contents of a world file: `docs/formats/world.md`.
+//! Contents of a world file: `docs/reference/formats/world.md`.
 
 mod expected_durations;
 mod hazard;

@@ -1,4 +1,4 @@
-//! Data types of certificates (`docs/formats/certificate.md`).
+//! Data types of certificates (`docs/reference/formats/certificate.md`).
 
 pub mod sound;
 

@@ -31,7 +31,7 @@ use crate::question::{
 };
 use crate::reply::{Failure, Reply, document};
 
-/// Exit codes, see `docs/exit-codes.md`.
+/// Exit codes, see `docs/reference/exit-codes.md`.
 const YES: u8 = 0;
 const NO: u8 = 1;
 const BAD_INPUT: u8 = 2;

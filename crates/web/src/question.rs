@@ -142,7 +142,7 @@ pub struct EnvelopeQuestion {
     #[serde(default)]
     pub objective: Objective,
     /// With the objective `probability`: the world with the distributions of durations
-    /// (`docs/formats/world.md`).
+    /// (`docs/reference/formats/world.md`).
     #[serde(default)]
     pub world: Option<Text>,
     /// `true` if both ends of each interval of the best box must be equally far from the nominal
@@ -174,10 +174,10 @@ pub struct RunQuestion {
     /// The first plan, with fixed times; without it, the planner makes one.
     #[serde(default)]
     pub plan: Option<Text>,
-    /// The world (`docs/formats/world.md`); without it, all actions go as planned.
+    /// The world (`docs/reference/formats/world.md`); without it, all actions go as planned.
     #[serde(default)]
     pub world: Option<Text>,
-    /// Probabilities for the executors that use them (`docs/formats/likelihoods.md`).
+    /// Probabilities for the executors that use them (`docs/reference/formats/likelihoods.md`).
     #[serde(default)]
     pub likelihoods: Option<Text>,
     /// The executor; the default one if missing.

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 /// The reply to a question.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Reply {
-    /// Exit code of the command: `docs/exit-codes.md`.
+    /// Exit code of the command: `docs/reference/exit-codes.md`.
     pub exit: u8,
     /// The document that the command prints with `--json`; empty for a page.
     pub document: String,

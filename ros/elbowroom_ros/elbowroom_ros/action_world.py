@@ -1,5 +1,5 @@
 """A world for `elbowroom run|serve … --world-process "action_world MAPPING.yaml"`: the actions of the plan are goals of ROS 2
-action servers. docs/ros2.md has the format of the mapping."""
+action servers. docs/reference/ros2.md has the format of the mapping."""
 
 import argparse
 import os

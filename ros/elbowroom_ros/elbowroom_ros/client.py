@@ -1,4 +1,4 @@
-"""Client of the HTTP interface of `elbowroom serve` (docs/serve.md), over TCP or a Unix socket."""
+"""Client of the HTTP interface of `elbowroom serve` (docs/reference/serve.md), over TCP or a Unix socket."""
 
 import http.client
 import json

@@ -1,4 +1,4 @@
-"""Node `executive`: starts `elbowroom serve`, or connects to one, and offers it in ROS 2. docs/ros2.md has the interfaces."""
+"""Node `executive`: starts `elbowroom serve`, or connects to one, and offers it in ROS 2. docs/reference/ros2.md has the interfaces."""
 
 import os
 import queue

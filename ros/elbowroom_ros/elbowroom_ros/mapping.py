@@ -1,4 +1,4 @@
-"""Mapping of the actions of a domain to ROS 2 action servers: a YAML file. docs/ros2.md has the format."""
+"""Mapping of the actions of a domain to ROS 2 action servers: a YAML file. docs/reference/ros2.md has the format."""
 
 import importlib
 import math

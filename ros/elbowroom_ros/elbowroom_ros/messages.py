@@ -1,4 +1,4 @@
-"""Messages of the executive, made from its documents (docs/serve.md)."""
+"""Messages of the executive, made from its documents (docs/reference/serve.md)."""
 
 import math
 

@@ -140,6 +140,6 @@ fn plans_are_dated() {
 
 #[test]
 fn document_shows_the_calendar_of_the_case() {
-    let document = include_str!("../../../../docs/calendars.md");
+    let document = include_str!("../../../../docs/reference/calendars.md");
     assert!(document.contains(include_str!("../../../../examples/market/calendar.toml")));
 }

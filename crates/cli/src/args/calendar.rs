@@ -7,7 +7,7 @@ use clap::Args;
 /// A calendar file beside the problem.
 #[derive(Args, Clone, Debug, Default)]
 pub(crate) struct CalendarArgs {
-    /// A calendar file (docs/calendars.md): its dates and recurring windows become timed initials of
+    /// A calendar file (docs/reference/calendars.md): its dates and recurring windows become timed initials of
     /// the problem
     #[arg(long, value_name = "CALENDAR.toml")]
     pub(crate) calendar: Option<PathBuf>,

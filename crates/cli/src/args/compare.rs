@@ -8,7 +8,7 @@ use super::number::count;
 
 #[derive(Args, Debug)]
 pub(crate) struct CompareArgs {
-    /// The experiment (docs/formats/experiment.md)
+    /// The experiment (docs/reference/formats/experiment.md)
     #[arg(value_name = "EXPERIMENT.toml")]
     pub(crate) experiment: PathBuf,
     /// Number of trials of each problem; by default that of the experiment

@@ -37,7 +37,7 @@ pub(crate) struct EnvelopeArgs {
     #[arg(long, value_parser = term(Objective::TERMS))]
     objective: Option<Objective>,
     /// With --objective probability: the world file that says how long actions take
-    /// (docs/formats/world.md)
+    /// (docs/reference/formats/world.md)
     #[arg(long, value_name = "FILE")]
     pub(crate) world: Option<PathBuf>,
     /// The largest box whose intervals have both bounds equally far from the nominal value
@@ -282,7 +282,7 @@ impl EnvelopeArgs {
             (Objective::Probability, None) => {
                 return Err(Failure::new(
                     "--objective probability needs distributions of the durations",
-                    "add --world with a world file (docs/formats/world.md)",
+                    "add --world with a world file (docs/reference/formats/world.md)",
                 ));
             }
             (Objective::Probability, Some(_)) | (_, None) => {}

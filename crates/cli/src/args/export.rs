@@ -17,7 +17,7 @@ use super::term::term;
 A network is written as GraphML, which the CSTNU Tool reads; to a file that ends in .txt, as plain STNU \
 text, and to one that ends in .json, as Elbowroom JSON, exactly. The other formats use integers; \
 a change of the unit of time is reported.\n\n\
-docs/second-witness.md describes the formats and how to check them with other programs.")]
+docs/reference/second-witness.md describes the formats and how to check them with other programs.")]
 pub(crate) struct ExportArgs {
     /// The output: the network as an STNU, the box or region as SMT-LIB 2, the optimum
     /// over all executors as a decision process for PRISM, or the problem with its calendar as PDDL

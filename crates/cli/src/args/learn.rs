@@ -11,7 +11,7 @@ use super::term::term;
 
 #[derive(Args, Debug)]
 pub(crate) struct LearnArgs {
-    /// Logs, oldest first: traces of `elbowroom run --trace`, or tables (docs/formats/log-csv.md)
+    /// Logs, oldest first: traces of `elbowroom run --trace`, or tables (docs/reference/formats/log-csv.md)
     #[arg(value_name = "LOG", required = true)]
     pub(crate) logs: Vec<PathBuf>,
     /// Write the learnt model as a world file, for `elbowroom run --world`

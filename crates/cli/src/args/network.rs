@@ -59,5 +59,5 @@ Formats, detected from the content:
   Elbowroom JSON      the output of --minimal and --dispatchable
 
 The output of --minimal and --dispatchable is GraphML if the name ends in .stn, .stnu, .graphml or \
-.xml, and otherwise Elbowroom JSON, in which nothing is lost. docs/networks.md explains the \
-answers, docs/formats/network.md describes the formats.";
+.xml, and otherwise Elbowroom JSON, in which nothing is lost. docs/reference/networks.md explains the \
+answers, docs/reference/formats/network.md describes the formats.";

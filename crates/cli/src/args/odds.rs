@@ -21,7 +21,7 @@ pub(crate) struct OddsArgs {
     /// The plan; without it, the embedded planner makes one, and its best order is used
     #[arg(value_name = "PLAN")]
     pub(crate) plan: Option<PathBuf>,
-    /// Probabilities of success and of spontaneous change (docs/formats/likelihoods.md)
+    /// Probabilities of success and of spontaneous change (docs/reference/formats/likelihoods.md)
     #[arg(long, value_name = "FILE")]
     pub(crate) likelihoods: PathBuf,
     /// Use the order of the plan's actions that is most likely to succeed instead of that of its
@@ -37,7 +37,7 @@ pub(crate) struct OddsArgs {
     /// Also list, for each happening, the facts that it and the following ones need
     #[arg(long)]
     pub(crate) layers: bool,
-    /// A world on a clock (docs/formats/world.md): execute the plan in samples of it
+    /// A world on a clock (docs/reference/formats/world.md): execute the plan in samples of it
     #[arg(long, value_name = "WORLD.toml")]
     pub(crate) world: Option<PathBuf>,
     #[arg(long, value_name = "NAME", requires = "world", help = executor_help())]

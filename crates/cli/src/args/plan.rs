@@ -32,12 +32,12 @@ pub(crate) struct PlanArgs {
     #[arg(long)]
     pub(crate) first: bool,
     /// Compare plans by this in place of metric and makespan: `slack`, the deviation that all durations
-    /// may have at the same time, in relation to their nominal values (docs/chosen-plans.md), or
+    /// may have at the same time, in relation to their nominal values (docs/reference/chosen-plans.md), or
     /// `probability`, the share of successful samples of --world. Without a time limit, a fixed
     /// number of plans is compared
     #[arg(long, value_parser = plan_objective(), conflicts_with = "first")]
     pub(crate) objective: Option<PlanObjective>,
-    /// The world file (docs/formats/world.md) for --objective probability
+    /// The world file (docs/reference/formats/world.md) for --objective probability
     // As in `RunArgs::spoil`: conflicts of the objective are conflicts of its world also.
     #[arg(long, value_name = "WORLD.toml", requires = "objective", conflicts_with_all = ["first", "jobs"])]
     pub(crate) world: Option<PathBuf>,
@@ -100,5 +100,5 @@ Planners:
                     the limits in seconds and MB
 
 Every plan is validated before it is printed, whichever planner made it. At the time limit and on \
-Ctrl-C the best plan so far is printed. docs/planners.md explains how to install each planner and \
+Ctrl-C the best plan so far is printed. docs/reference/planners.md explains how to install each planner and \
 what each outcome means.";

@@ -76,7 +76,7 @@ pub(crate) struct RunArgs {
     #[arg(long, value_name = "N", value_parser = count, conflicts_with = "replay")]
     #[arg(allow_negative_numbers = true)]
     pub(crate) jobs: Option<usize>,
-    /// The simulated world (docs/formats/world.md), or `spoiler`, an adversary that ends each
+    /// The simulated world (docs/reference/formats/world.md), or `spoiler`, an adversary that ends each
     /// action at the worst time; without it, everything goes as planned
     #[arg(long, value_name = "WORLD.toml|spoiler")]
     pub(crate) world: Option<PathBuf>,
@@ -96,7 +96,7 @@ pub(crate) struct RunArgs {
         conflicts_with = "world_process"
     )]
     pub(crate) spoil: Option<String>,
-    /// A program that is the world and speaks JSON Lines (docs/formats/world-protocol.md)
+    /// A program that is the world and speaks JSON Lines (docs/reference/formats/world-protocol.md)
     #[arg(long, value_name = "COMMAND", conflicts_with = "world")]
     pub(crate) world_process: Option<String>,
     /// Time limit in seconds for each answer of that program
@@ -116,7 +116,7 @@ pub(crate) struct RunArgs {
     /// The executor
     #[arg(long, value_name = "NAME", default_value = DEFAULT_EXECUTOR)]
     pub(crate) executor: String,
-    /// Probabilities of success and of spontaneous change (docs/formats/likelihoods.md), for the
+    /// Probabilities of success and of spontaneous change (docs/reference/formats/likelihoods.md), for the
     /// executors that use them; without it, everything is certain
     #[arg(long, value_name = "FILE")]
     pub(crate) likelihoods: Option<PathBuf>,
@@ -155,7 +155,7 @@ pub(crate) struct RunArgs {
     pub(crate) running: RunningChoice,
     /// Time that planning takes in the world: `measured`, or a number of seconds; by default 0,
     /// with --realtime and --world-process `measured`. If it is measured, plans are made in the
-    /// background while the run continues (docs/serve.md)
+    /// background while the run continues (docs/reference/serve.md)
     #[arg(long, value_name = "measured|S", allow_negative_numbers = true)]
     pub(crate) planning_time: Option<String>,
     /// Memory limit in MB of a planner in the background
@@ -182,7 +182,7 @@ pub(crate) struct RunArgs {
     #[arg(long, value_name = "FACTOR", value_parser = factor)]
     #[arg(allow_negative_numbers = true, conflicts_with = "world_process")]
     pub(crate) realtime: Option<Rational>,
-    /// Write a trace of the run to this file (docs/formats/trace.md)
+    /// Write a trace of the run to this file (docs/reference/formats/trace.md)
     #[arg(long, value_name = "FILE.jsonl")]
     pub(crate) trace: Option<PathBuf>,
     /// Write the run in the format of Perfetto (ui.perfetto.dev)
@@ -191,7 +191,7 @@ pub(crate) struct RunArgs {
     /// Write the run as an MCAP file, for Foxglove
     #[arg(long, value_name = "FILE.mcap", conflicts_with = "replay")]
     pub(crate) mcap: Option<PathBuf>,
-    /// Write a journal of the run to this file (docs/formats/journal.md): a trace that survives a
+    /// Write a journal of the run to this file (docs/reference/formats/journal.md): a trace that survives a
     /// crash. Each start is on disk before it is sent. A simulated world ends with the program and
     /// has no journal
     #[arg(

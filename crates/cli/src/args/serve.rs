@@ -16,7 +16,7 @@ const PORT: &str = "7316";
 
 #[derive(Args, Debug)]
 #[command(after_help = "\
-Without PROBLEM, the executive waits for one (`elbowroom ctl problem`). docs/serve.md describes \
+Without PROBLEM, the executive waits for one (`elbowroom ctl problem`). docs/reference/serve.md describes \
 its requests.")]
 #[command(mut_arg("time_limit", |it| it
     .default_value("1000000000")
@@ -76,7 +76,7 @@ fn size(text: &str) -> Result<u64, String> {
 
 #[derive(Args, Debug)]
 #[command(after_help = "\
-docs/serve.md describes requests and answers. Exit codes: 0 done; 2 rejected, or no answer.")]
+docs/reference/serve.md describes requests and answers. Exit codes: 0 done; 2 rejected, or no answer.")]
 pub(crate) struct CtlArgs {
     /// Address of the executive: a port, HOST:PORT, or the path of its socket
     #[arg(long, value_name = "ADDRESS", value_parser = Target::read, default_value = PORT)]

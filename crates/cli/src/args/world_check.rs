@@ -15,7 +15,7 @@ cancelled, and two run at the same time. A real robot moves. Without a plan, the
 
 Exit codes: 0 no violations; 1 violations; 2 the world cannot be started.")]
 pub(crate) struct WorldCheckArgs {
-    /// The world program, with its arguments (docs/formats/world-protocol.md)
+    /// The world program, with its arguments (docs/reference/formats/world-protocol.md)
     #[arg(value_name = "COMMAND")]
     pub(crate) command: String,
     /// The domain, in PDDL

@@ -1,4 +1,4 @@
-//! `elbowroom ctl`: client of an executive, `docs/serve.md`.
+//! `elbowroom ctl`: client of an executive, `docs/reference/serve.md`.
 
 mod words;
 

@@ -106,7 +106,7 @@ fn timed_problem(arguments: &ExportArgs, output: &mut Output) -> Answer {
     if arguments.problem.calendar.calendar.is_none() {
         return Err(Failure::new(
             "a calendar is missing; without one, the output would be the unchanged problem",
-            "give one with --calendar (docs/calendars.md)",
+            "give one with --calendar (docs/reference/calendars.md)",
         ));
     }
     prism::reject_plan_options(

@@ -35,7 +35,7 @@ pub(crate) fn run(arguments: &LearnArgs, output: &mut Output) -> Answer {
             LogError::Table(mistakes) => Failure::from(mistakes),
             error => Failure::new(
                 error,
-                "traces are what `elbowroom run --trace` writes; docs/formats/log-csv.md describes tables",
+                "traces are what `elbowroom run --trace` writes; docs/reference/formats/log-csv.md describes tables",
             ),
         })?;
         if log.records.is_empty() {

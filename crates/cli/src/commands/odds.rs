@@ -43,7 +43,7 @@ pub(crate) fn run(arguments: &OddsArgs, output: &mut Output) -> Answer {
     let answer = odds(&request, &mut watch).map_err(|error| {
         Failure::new(
             error,
-            "docs/probability.md lists the plans whose probability can be computed",
+            "docs/research/probability.md lists the plans whose probability can be computed",
         )
     })?;
     let title = format!("{}: the orders of its plan", answer.problem);
@@ -108,7 +108,7 @@ fn read_likelihoods(
 ) -> Result<Arc<elbowroom::probability::Likelihoods>, Failure> {
     let read = likelihoods::read(text.clone(), task).map_err(|wrong| {
         Failure::from(wrong)
-            .with_default_advice("docs/formats/likelihoods.md describes likelihood files")
+            .with_default_advice("docs/reference/formats/likelihoods.md describes likelihood files")
     })?;
     Ok(Arc::new(read))
 }

@@ -124,7 +124,7 @@ fn run_with_objective(
         (PlanObjective::Probability, None) => {
             return Err(Failure::new(
                 "`--objective probability` needs a world file",
-                "give one with --world (docs/formats/world.md)",
+                "give one with --world (docs/reference/formats/world.md)",
             ));
         }
         (PlanObjective::Probability, Some(path)) => {
@@ -163,7 +163,7 @@ fn planner_of(arguments: &PlanArgs) -> Result<Planner, Failure> {
 fn unsupported(error: RequestError) -> Failure {
     Failure::new(
         error,
-        "docs/planners.md lists what the embedded planner supports; --planner selects another one",
+        "docs/reference/planners.md lists what the embedded planner supports; --planner selects another one",
     )
 }
 

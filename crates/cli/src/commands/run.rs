@@ -413,7 +413,7 @@ fn exit(outcome: &RunOutcome, trace: Option<String>) -> Answer {
         Verdict::WorldFailed { why } => {
             return Err(Failure::new(
                 format!("the world failed: {}", escape_control(why)),
-                "docs/formats/world-protocol.md describes the requirements on a world",
+                "docs/reference/formats/world-protocol.md describes the requirements on a world",
             ));
         }
     })

@@ -1,4 +1,4 @@
-//! `elbowroom serve`: a long-lived executive, `docs/serve.md`.
+//! `elbowroom serve`: a long-lived executive, `docs/reference/serve.md`.
 
 use std::cell::OnceCell;
 use std::sync::Arc;

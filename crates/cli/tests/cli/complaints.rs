@@ -1,4 +1,4 @@
-//! Typical complaints about plan executors: one test for each row of `docs/complaints.md`, with a
+//! Typical complaints about plan executors: one test for each row of `docs/reference/complaints.md`, with a
 //! small scenario like that of the thread and the behaviour of this executor.
 
 mod toy;
@@ -656,7 +656,7 @@ fn robots_act_concurrently_and_accept_goals_during_execution() {
 /// Each row of the page names a test in this file, and each test has a row.
 #[test]
 fn document_lists_every_test() {
-    let page = fs::read_to_string(root().join("docs/complaints.md")).expect("the page");
+    let page = fs::read_to_string(root().join("docs/reference/complaints.md")).expect("the page");
     let own =
         fs::read_to_string(root().join("crates/cli/tests/cli/complaints.rs")).expect("this file");
     let tests = own.split("#[test]\nfn ").skip(1);

@@ -18,7 +18,7 @@ fn benchmarks() -> Option<PathBuf> {
     root.join("plans.csv").is_file().then_some(root)
 }
 
-/// Uses the tolerance at which the validator and VAL agree on all plans (`docs/val-agreement.md`).
+/// Uses the tolerance at which the validator and VAL agree on all plans (`docs/research/val-agreement.md`).
 #[test]
 fn output_has_the_phrases_of_val() {
     let Some(root) = benchmarks() else {

@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 use elbowroom::model::TimeTriggeredPlan;
 
 /// Runs `Validate` on a plan with a tolerance of a thousandth and a time limit of a minute. Returns
-/// `valid`, `failed`, or `error` if there is no verdict. `docs/val-agreement.md` explains the
+/// `valid`, `failed`, or `error` if there is no verdict. `docs/research/val-agreement.md` explains the
 /// meaning of the tolerance.
 pub(crate) fn verdict(
     program: &Path,

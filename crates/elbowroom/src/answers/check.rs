@@ -28,7 +28,7 @@ pub struct CheckRequest<'a> {
     pub settings: Settings,
 }
 
-/// The result of a validation: `docs/formats/check-json.md`.
+/// The result of a validation: `docs/reference/formats/check-json.md`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum CheckAnswer {

@@ -74,7 +74,7 @@ pub enum LogError {
 }
 
 impl Log {
-    /// Reads a trace of a run (`docs/formats/trace.md`), or a table (`docs/formats/log-csv.md`). A
+    /// Reads a trace of a run (`docs/reference/formats/trace.md`), or a table (`docs/reference/formats/log-csv.md`). A
     /// text that begins with `{` is a trace.
     ///
     /// # Errors
@@ -106,7 +106,7 @@ impl Log {
     }
 }
 
-/// The result of learning from logs: `docs/formats/learn-json.md`.
+/// The result of learning from logs: `docs/reference/formats/learn-json.md`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LearnAnswer {
     /// Format of the document.

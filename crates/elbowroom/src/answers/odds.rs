@@ -108,7 +108,7 @@ impl From<OddsSemantics> for Semantics {
     }
 }
 
-/// The success probability of a plan: `docs/formats/odds-json.md`.
+/// The success probability of a plan: `docs/reference/formats/odds-json.md`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct OddsAnswer {
     /// Format of the document.

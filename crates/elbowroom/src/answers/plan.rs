@@ -51,7 +51,7 @@ pub struct PlanOutcome {
     pub plan: Option<TimeTriggeredPlan>,
 }
 
-/// A plan, or the reason why there is none: `docs/formats/plan-json.md`.
+/// A plan, or the reason why there is none: `docs/reference/formats/plan-json.md`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlanAnswer {
     /// Format of the document.

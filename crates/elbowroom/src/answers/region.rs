@@ -27,7 +27,7 @@ pub use picture::{Others, PictureError, Plane, picture};
 /// Largest number of positions that are distinguished for a moment inside an action.
 const MAX_POSITIONS: usize = 256;
 
-/// The answer as a document (`docs/formats/region-json.md`), with the plan and the region.
+/// The answer as a document (`docs/reference/formats/region-json.md`), with the plan and the region.
 #[derive(Clone, Debug)]
 pub struct RegionOutcome {
     /// The answer.
@@ -38,7 +38,7 @@ pub struct RegionOutcome {
     pub region: Option<elbowroom_envelope::Region>,
 }
 
-/// All values of its parameters for which a plan works: `docs/formats/region-json.md`.
+/// All values of its parameters for which a plan works: `docs/reference/formats/region-json.md`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RegionAnswer {
     /// Format of the document.

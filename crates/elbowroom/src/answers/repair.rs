@@ -64,14 +64,14 @@ impl RepairRequest {
 /// The answer, with the repaired problem and plan.
 #[derive(Clone, Debug)]
 pub struct RepairOutcome {
-    /// The answer as a document (`docs/formats/repair-json.md`).
+    /// The answer as a document (`docs/reference/formats/repair-json.md`).
     pub answer: RepairAnswer,
     /// The changed problem, and the plan with times for it, which the validator accepts; `None`
     /// without a repair.
     pub repaired: Option<(Task, TimeTriggeredPlan)>,
 }
 
-/// The cheapest change that makes a plan work: `docs/formats/repair-json.md`.
+/// The cheapest change that makes a plan work: `docs/reference/formats/repair-json.md`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RepairAnswer {
     /// Format of the document.

@@ -21,7 +21,7 @@ pub struct RunOutcome {
     pub report: Report,
 }
 
-/// The result of a run: `docs/formats/run-json.md`.
+/// The result of a run: `docs/reference/formats/run-json.md`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RunAnswer {
     /// The answer itself, as in the last line of a trace.

@@ -30,7 +30,7 @@ pub struct StnOutcome {
     pub plan: Option<ParametrizedPlan>,
 }
 
-/// A plan as a network: `docs/formats/stn-json.md`.
+/// A plan as a network: `docs/reference/formats/stn-json.md`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StnAnswer {
     /// Format of the document.

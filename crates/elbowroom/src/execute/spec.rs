@@ -34,7 +34,7 @@ pub const EMBEDDED: &str = "embedded";
 
 /// All data that a run depends on, except its initial plan and the events of the world.
 ///
-/// The arguments of `elbowroom run`, the header of a trace (`docs/formats/trace.md`) and the input
+/// The arguments of `elbowroom run`, the header of a trace (`docs/reference/formats/trace.md`) and the input
 /// of a replay are all of this type, so that they have the same meaning. A member that is unknown
 /// or missing is an error; optional members are [marked as such](RunSpec::planner_time).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -48,14 +48,14 @@ pub struct RunSpec {
     pub domain: NamedText,
     /// The problem, in PDDL.
     pub problem: NamedText,
-    /// The world file (`docs/formats/world.md`) of a simulation; without one, everything goes as
+    /// The world file (`docs/reference/formats/world.md`) of a simulation; without one, everything goes as
     /// planned.
     #[serde(deserialize_with = "required")]
     pub world: Option<String>,
     /// The command line of the process that simulates or controls the world.
     #[serde(deserialize_with = "required")]
     pub world_process: Option<String>,
-    /// The world file that the executor believes (`docs/formats/world.md`): distributions of durations, failures and
+    /// The world file that the executor believes (`docs/reference/formats/world.md`): distributions of durations, failures and
     /// changes of facts. Omitted if it believes the file of the simulation, or knows nothing of its process.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub believed: Option<String>,
@@ -85,7 +85,7 @@ pub struct RunSpec {
     #[serde(default, with = "positive::option")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub planner_time: Option<Rational>,
-    /// A likelihood file (`docs/formats/likelihoods.md`); without one, everything is certain.
+    /// A likelihood file (`docs/reference/formats/likelihoods.md`); without one, everything is certain.
     #[serde(deserialize_with = "required")]
     pub likelihoods: Option<NamedText>,
     /// `true` if there is an initial plan; in a trace, it is the first entry.

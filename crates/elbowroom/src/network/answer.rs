@@ -1,4 +1,4 @@
-//! The answer about a network as a document: `docs/formats/network.md`.
+//! The answer about a network as a document: `docs/reference/formats/network.md`.
 
 use elbowroom_num::Rational;
 use serde::{Deserialize, Serialize};

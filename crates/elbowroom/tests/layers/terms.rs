@@ -14,18 +14,26 @@ type Names = fn() -> Vec<&'static str>;
 
 /// Files that list all names of a table.
 const LISTS: &[(&str, Names)] = &[
-    ("docs/guarantees.md", || names(Guarantee::TERMS)),
-    ("docs/formats/trace.md", || names(Guarantee::TERMS)),
+    ("docs/reference/guarantees.md", || names(Guarantee::TERMS)),
+    ("docs/reference/formats/trace.md", || {
+        names(Guarantee::TERMS)
+    }),
     ("crates/python/python/elbowroom/_problem.py", || {
         names(Guarantee::TERMS)
     }),
     ("crates/python/python/elbowroom/_answers.py", || {
         names(Guarantee::TERMS)
     }),
-    ("docs/largest-box.md", || names(Objective::TERMS)),
-    ("docs/formats/trace.md", || names(Objective::TERMS)),
-    ("docs/chosen-plans.md", || names(PlanObjective::TERMS)),
-    ("docs/formats/trace.md", || names(GuaranteeLevel::TERMS)),
+    ("docs/reference/largest-box.md", || names(Objective::TERMS)),
+    ("docs/reference/formats/trace.md", || {
+        names(Objective::TERMS)
+    }),
+    ("docs/reference/chosen-plans.md", || {
+        names(PlanObjective::TERMS)
+    }),
+    ("docs/reference/formats/trace.md", || {
+        names(GuaranteeLevel::TERMS)
+    }),
     ("crates/executive/src/interface/documents.rs", || {
         names(GuaranteeLevel::TERMS)
     }),
@@ -101,7 +109,7 @@ fn certificates_use_the_same_names_of_guarantees() {
 /// `ELBOWROOM_UPDATE_DOCS=1 cargo test -p elbowroom --test layers terms` updates the table.
 #[test]
 fn trace_document_lists_the_causes() {
-    const PATH: &str = "docs/formats/trace.md";
+    const PATH: &str = "docs/reference/formats/trace.md";
     let (begin, end) = ("<!-- causes: begin -->\n", "<!-- causes: end -->");
     let page = text(PATH);
     let (before, rest) = page.split_once(begin).expect("a place for the table");

@@ -1,4 +1,4 @@
-//! `docs/executors.md` lists the executors as the program does.
+//! `docs/reference/executors.md` lists the executors as the program does.
 
 use std::fmt::Write;
 
@@ -11,7 +11,10 @@ const END: &str = "<!-- end -->";
 /// `ELBOWROOM_UPDATE_DOCS=1 cargo test -p elbowroom-execution --test execution executors_page` updates the list.
 #[test]
 fn the_page_lists_the_executors_as_they_are_registered() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/executors.md");
+    let path = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../docs/reference/executors.md"
+    );
     let page = std::fs::read_to_string(path).expect("the page");
     let (before, rest) = page.split_once(BEGIN).expect("a place for the list");
     let (listed, after) = rest.split_once(END).expect("an end of the list");
@@ -24,7 +27,9 @@ fn the_page_lists_the_executors_as_they_are_registered() {
         std::fs::write(path, page).expect("the page can be written");
         return;
     }
-    panic!("docs/executors.md is out of date; ELBOWROOM_UPDATE_DOCS=1 writes it anew:\n{list}");
+    panic!(
+        "docs/reference/executors.md is out of date; ELBOWROOM_UPDATE_DOCS=1 writes it anew:\n{list}"
+    );
 }
 
 fn list() -> String {

@@ -222,7 +222,7 @@ impl ApiRouter {
         let request = match request {
             Ok(request) => request,
             Err(RequestError { status, reason }) => {
-                let help = "docs/serve.md documents the requests";
+                let help = "docs/reference/serve.md documents the requests";
                 return refuse(stream, &ApiError::new(status, reason, help));
             }
         };

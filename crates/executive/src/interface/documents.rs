@@ -1,4 +1,4 @@
-//! Requests and responses as JSON: `docs/serve.md`.
+//! Requests and responses as JSON: `docs/reference/serve.md`.
 
 use std::fmt;
 

@@ -1,4 +1,4 @@
-//! Experiment files: `docs/formats/experiment.md`.
+//! Experiment files: `docs/reference/formats/experiment.md`.
 
 mod file;
 

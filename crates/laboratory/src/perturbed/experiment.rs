@@ -1,4 +1,4 @@
-//! Experiment files for perturbed worlds: `docs/perturbed-worlds.md`.
+//! Experiment files for perturbed worlds: `docs/research/perturbed-worlds.md`.
 
 use std::collections::BTreeMap;
 
@@ -51,7 +51,7 @@ pub struct Case {
     pub most_running: usize,
     /// Other rules for which the optimum is also computed.
     pub also: Vec<OptimumRules>,
-    /// Likelihood file (`docs/formats/likelihoods.md`).
+    /// Likelihood file (`docs/reference/formats/likelihoods.md`).
     pub likelihoods: String,
     /// Published measurements in the world as published.
     pub published: Option<Published>,

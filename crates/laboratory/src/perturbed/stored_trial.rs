@@ -1,4 +1,4 @@
-//! Course of a trial as a document: `docs/formats/course.md`.
+//! Course of a trial as a document: `docs/reference/formats/course.md`.
 
 use elbowroom_model::Task;
 use elbowroom_model::ground::FactId;

@@ -15,7 +15,7 @@ use super::{ActionName, ExecutorEntry, InstrumentedWorld, UntimedExecutor};
 
 pub(super) const REGISTERED: ExecutorEntry = ExecutorEntry {
     name: "lookahead",
-    summary: "The optimal policy in the sound world (`docs/probability.md`), \
+    summary: "The optimal policy in the sound world (`docs/research/probability.md`), \
               regardless of the plan. It is exact if at most `most_running` actions \
               run at once.",
     paper: "goes beyond Ribeiro et al. (2021)",

@@ -157,12 +157,15 @@ mod tests {
     fn page_matches_the_list_of_executors() {
         let path = concat!(
             env!("CARGO_MANIFEST_DIR"),
-            "/../../docs/perturbed-worlds.md"
+            "/../../docs/research/perturbed-worlds.md"
         );
         let page = std::fs::read_to_string(path).unwrap();
         for known in EXECUTORS {
             let row = format!("| `{}` | {} |\n", known.name, known.summary);
-            assert!(page.contains(&row), "docs/perturbed-worlds.md lacks\n{row}");
+            assert!(
+                page.contains(&row),
+                "docs/research/perturbed-worlds.md lacks\n{row}"
+            );
         }
     }
 }

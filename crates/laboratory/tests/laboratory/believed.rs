@@ -104,7 +104,7 @@ fn logs(experiment: &Experiment, count: u64, first: u64) -> Vec<Log> {
 /// The loss depends on the logs: in `rendezvous`, it is five points if a tenth of failures looks
 /// like a sixth. The test checks the mean.
 ///
-/// For the table of docs/learning.md: `ELBOWROOM_LEARNT=20 cargo test --workspace --test laboratory
+/// For the table of docs/reference/learning.md: `ELBOWROOM_LEARNT=20 cargo test --workspace --test laboratory
 /// world_learnt -- --nocapture`.
 #[test]
 fn world_learnt_from_few_logs_is_as_good_as_the_true_one() {

@@ -33,7 +33,7 @@ fn experiment(name: &str) -> Experiment {
     }
 }
 
-/// Optimum without foresight, by the bounds in docs/experiments.md, minus a tolerance of three
+/// Optimum without foresight, by the bounds in docs/research/experiments.md, minus a tolerance of three
 /// standard errors of 40 trials and five points.
 const NEAR: [(&str, f64); 2] = [("weld", 0.957 - 0.15), ("vase", 0.976 - 0.13)];
 

@@ -1,4 +1,4 @@
-//! Reader for Elbowroom's own JSON format (`docs/formats/network.md`), which [`crate::write`]
+//! Reader for Elbowroom's own JSON format (`docs/reference/formats/network.md`), which [`crate::write`]
 //! writes.
 
 use elbowroom_num::Rational;

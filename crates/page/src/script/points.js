@@ -1,6 +1,6 @@
 // Decides exactly, in whole numbers, whether a plan works with given values.
 //
-// Input: the inequalities of the answer of `envelope` (docs/formats/envelope-json.md), and a value for each
+// Input: the inequalities of the answer of `envelope` (docs/reference/formats/envelope-json.md), and a value for each
 // parameter, as a text: `10`, `0.25`, `1393/2`. The plan works if its network has a schedule and no schedule
 // violates a requirement.
 

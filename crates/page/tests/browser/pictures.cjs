@@ -1,4 +1,4 @@
-// Makes the pictures of README and docs/pages.md again, from pages that are made again:
+// Makes the pictures of README and docs/reference/pages.md again, from pages that are made again:
 //
 //   node pictures.cjs ELBOWROOM CASES WORK [CHROMIUM]
 //

@@ -1,7 +1,7 @@
-//! Writes `docs/pddl-support.md`: the supported, refused and ignored parts of PDDL, and the results
+//! Writes `docs/reference/pddl-support.md`: the supported, refused and ignored parts of PDDL, and the results
 //! for each domain of the benchmark set.
 //!
-//! `cargo run --release -p elbowroom-pddl --example pddl_support > docs/pddl-support.md`
+//! `cargo run --release -p elbowroom-pddl --example pddl_support > docs/reference/pddl-support.md`
 
 #![allow(clippy::print_stdout, reason = "an example shows its result")]
 

@@ -45,9 +45,9 @@ fn every_benchmark_is_read_unless_it_is_wrong_or_uses_a_refused_feature() {
     tfd/rovers-object-fluent/instances/pfile9.pddl
     tfd/timed-initials-test/instances/problem.pddl
     ");
-    let written = include_str!("../../../../docs/pddl-support.md");
+    let written = include_str!("../../../../docs/reference/pddl-support.md");
     assert!(
         written == document::document(Some(&survey)),
-        "docs/pddl-support.md is out of date: run the example pddl_support"
+        "docs/reference/pddl-support.md is out of date: run the example pddl_support"
     );
 }

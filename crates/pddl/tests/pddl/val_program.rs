@@ -1,6 +1,6 @@
 //! Compares the validator with VAL, the program that `ELBOWROOM_VAL` names.
 //!
-//! `docs/val-agreement.md` lists the disagreements and their causes.
+//! `docs/research/val-agreement.md` lists the disagreements and their causes.
 
 #![allow(
     clippy::format_push_string,

@@ -1,6 +1,6 @@
 //! The validator against the recorded verdicts of VAL, on all plans of the benchmark set.
 //!
-//! `docs/val-agreement.md` lists the disagreements and their causes.
+//! `docs/research/val-agreement.md` lists the disagreements and their causes.
 
 use std::path::PathBuf;
 
@@ -19,7 +19,7 @@ const DISAGREEMENTS: [&str; 5] = [
     "val-samples/sleeping-beauty-with-magnetic-window-alarm/plans/sleepingbeauty-problem.src.plan at 0.01",
 ];
 
-const DOCUMENT: &str = include_str!("../../../../docs/val-agreement.md");
+const DOCUMENT: &str = include_str!("../../../../docs/research/val-agreement.md");
 
 /// Returns the benchmark set, or `None` if it is not installed.
 fn benchmarks() -> Option<PathBuf> {

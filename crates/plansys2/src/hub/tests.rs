@@ -1,4 +1,4 @@
-//! Tests of each row of the table in `docs/plansys2.md`.
+//! Tests of each row of the table in `docs/reference/plansys2.md`.
 
 use super::*;
 

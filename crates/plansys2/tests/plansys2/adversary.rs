@@ -248,7 +248,7 @@ fn run(seed: u64) -> BTreeMap<&'static str, u64> {
     let mut hub = Hub::new("elbowroom");
     let mut judge = OutputChecker::default();
     for it in 0..adversary.performers.len() {
-        // Each performer has reported once. `docs/plansys2.md` describes the behaviour for unknown
+        // Each performer has reported once. `docs/reference/plansys2.md` describes the behaviour for unknown
         // ones.
         let node_name = adversary.performers[it].name.clone();
         hub.status(

@@ -1,4 +1,4 @@
-//! Elbowroom's likelihood files, in TOML: [`read()`]. `docs/formats/likelihoods.md` defines the
+//! Elbowroom's likelihood files, in TOML: [`read()`]. `docs/reference/formats/likelihoods.md` defines the
 //! format.
 
 mod complete;

@@ -1,7 +1,7 @@
 """Answers: the results of the methods of a :class:`~elbowroom.Problem`.
 
 Each holds the document that the command prints with ``--json`` (``.document``, described in
-``docs/formats``), with its exact numbers as fractions, and has properties for the most important parts.
+``docs/reference/formats``), with its exact numbers as fractions, and has properties for the most important parts.
 """
 
 from __future__ import annotations
@@ -337,7 +337,7 @@ class Envelope(Table):
 
     @property
     def counterexample(self) -> dict[str, Any] | None:
-        """Possible failures, with values and a schedule; ``docs/formats/envelope-json.md``."""
+        """Possible failures, with values and a schedule; ``docs/reference/formats/envelope-json.md``."""
         found: dict[str, Any] | None = self.document.get("counterexample")
         return found
 
@@ -457,7 +457,7 @@ class Run(Table):
         return [str(reason["words"]) for reason in self.document["reasons"]]
 
     def trace(self) -> list[dict[str, Any]]:
-        """Returns the entries of the run's record (``docs/formats/trace.md``).
+        """Returns the entries of the run's record (``docs/reference/formats/trace.md``).
 
         Raises:
             ValueError: if none was kept (``trace=False``).

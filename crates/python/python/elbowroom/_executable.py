@@ -47,7 +47,7 @@ class Executable:
 
         Args:
             plan: the initial plan; by default, the planner makes one.
-            world: a :class:`World` or a :class:`SteppedWorld` in Python, or a world file (``docs/formats/world.md``); without
+            world: a :class:`World` or a :class:`SteppedWorld` in Python, or a world file (``docs/reference/formats/world.md``); without
                 one, all durations and outcomes are as planned.
             executor: the name of the executor; :func:`elbowroom.executors` lists them.
             planner: the planner for new plans: ``"embedded"``, ``"none"``, another planner's name or
@@ -58,7 +58,7 @@ class Executable:
             progress: receives the events of the run; ``True`` shows a bar.
             stop: a handle that ends the run in order, from any thread.
             options: further members of a run's specification, as the header of a trace has them
-                (``docs/formats/trace.md``): ``time_limit`` and ``planning_time`` in the world's
+                (``docs/reference/formats/trace.md``): ``time_limit`` and ``planning_time`` in the world's
                 seconds, ``timeout`` (as in :meth:`envelope`), ``max_replans``, ``vary``,
                 ``guarantee``, ``precision``, ``running``, ``likelihoods``, ``believed`` (the world file that the executor
                 believes, for example of a world in Python), ``self_overlap``, …; and ``jobs``, the number of threads of the

@@ -70,14 +70,14 @@ class Executive(BackgroundRun):
         Args:
             domain: the domain in PDDL: a path, or the text.
             problem: the problem. Its goal is the first one, with the name ``problem``.
-            world: a world in Python, or a world file (``docs/formats/world.md``) for a simulation on the real clock;
+            world: a world in Python, or a world file (``docs/reference/formats/world.md``) for a simulation on the real clock;
                 without one, all durations and outcomes are as planned. The methods of an ``AsyncWorld`` are called in the running
                 event loop.
             journal: a new file, from which :meth:`resume` continues after a crash. For worlds in Python, and for
                 ``world_process="COMMAND"``.
             learn: a folder for logs and for ``world.toml``, the model learnt from the journal when the executive is idle
                 and at the end
-                (``docs/learning.md``). ``believed=`` is the model that the executor believes.
+                (``docs/reference/learning.md``). ``believed=`` is the model that the executor believes.
             executor: the name of the executor; :func:`elbowroom.executors` lists them.
             planner: ``"embedded"``, another planner's name, or a command line.
             seed: the random seed of a simulated world.
@@ -353,7 +353,7 @@ class Executive(BackgroundRun):
                 self._over.wait(min(left, POLL_INTERVAL))
 
     def events(self, after: int | None = None) -> Iterator[dict[str, Any]]:
-        """Iterates over the entries of the trace as they are written (``docs/formats/trace.md``), until the executive ends.
+        """Iterates over the entries of the trace as they are written (``docs/reference/formats/trace.md``), until the executive ends.
 
         Args:
             after: the number of the last line that is known already: 0 for all lines that are kept, the last 2 to 4 MB;

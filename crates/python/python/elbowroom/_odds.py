@@ -95,7 +95,7 @@ class Odds(Table):
 
     def __init__(self, document: dict[str, Any], lattice_svg: str | None) -> None:
         self.document: dict[str, Any] = document
-        """The answer as the document that the command prints (``docs/formats/odds-json.md``)."""
+        """The answer as the document that the command prints (``docs/reference/formats/odds-json.md``)."""
         self.lattice_svg: str | None = lattice_svg
         """The picture of all orders, if it was requested and there are not too many."""
 

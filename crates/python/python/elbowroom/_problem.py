@@ -340,7 +340,7 @@ class Problem(Executable):
         Args:
             plan: a plan with fixed times; by default, the planner makes one, and its likeliest order is used.
             likelihoods: the likelihoods of facts and actions: a path or a text
-                (``docs/formats/likelihoods.md``).
+                (``docs/reference/formats/likelihoods.md``).
             world: a world file, for executing the plan in samples of it.
             best: ``True`` for the likeliest order instead of that of the plan's times.
             semantics: the result of a failed effect: the opposite value (``"paper"``), or the unchanged

@@ -84,7 +84,7 @@ class World:
 
     The world answers each start by :func:`started` and, if the action takes time, later by one
     :func:`ended`. It answers each cancellation of a running action by an :func:`ended`. Time never
-    decreases. ``docs/formats/world-protocol.md`` has the whole contract, and defines the handling of
+    decreases. ``docs/reference/formats/world-protocol.md`` has the whole contract, and defines the handling of
     worlds that violate it; a run never hangs because of such a world.
 
     >>> import elbowroom

@@ -191,7 +191,7 @@ def compare(
     """Runs an experiment, which compares executors in many runs.
 
     Args:
-        experiment: an experiment file (``docs/formats/experiment.md``).
+        experiment: an experiment file (``docs/reference/formats/experiment.md``).
         engine: ``"local"``: threads of this process; ``"ray"``: tasks of a Ray cluster;
             ``"slurm"``: a job array.
         trials: the number of trials of each problem and column; by default that of the experiment.

@@ -23,7 +23,7 @@ pub use plan_adoption::{
 pub use starts::{RunningActionLine, StartLine};
 
 /// The second line of a rotated record, which replaces all earlier records. Rotation happens when a
-/// persistent run is idle or adopts a plan: `docs/formats/journal.md`.
+/// persistent run is idle or adopts a plan: `docs/reference/formats/journal.md`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SnapshotLine {

@@ -54,8 +54,9 @@ pub(super) fn text(arguments: &ExportArgs, output: &mut Output) -> Result<String
     let written = if let Some(path) = &process.likelihoods {
         let text = input::source(path, "likelihoods")?;
         let likelihoods = likelihoods::read(text, &task).map_err(|wrong| {
-            Failure::from(wrong)
-                .with_default_advice("docs/formats/likelihoods.md describes likelihood files")
+            Failure::from(wrong).with_default_advice(
+                "docs/reference/formats/likelihoods.md describes likelihood files",
+            )
         })?;
         let lost = optimum::Settings::default();
         let settings = optimum::Settings {
@@ -79,7 +80,7 @@ pub(super) fn text(arguments: &ExportArgs, output: &mut Output) -> Result<String
     written.map_err(|error| {
         let advice = match error {
             PrismError::NotTabulated(_) | PrismError::Unsupported(_) | PrismError::NotSmall(_) => {
-                "docs/second-witness.md lists the problems that can be written as processes"
+                "docs/reference/second-witness.md lists the problems that can be written as processes"
             }
             _ => "",
         };

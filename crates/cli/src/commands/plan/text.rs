@@ -76,9 +76,9 @@ pub(super) fn certificate_text(answer: &PlanAnswer, look: TextLayout) -> Option<
         PlanFinding::None { uncertified, .. } => {
             uncertified.as_ref()?;
             let other = if answer.planner == EMBEDDED {
-                "another planner may find one: --planner, docs/planners.md"
+                "another planner may find one: --planner, docs/reference/planners.md"
             } else {
-                "another planner may find one: --planner embedded, docs/planners.md"
+                "another planner may find one: --planner embedded, docs/reference/planners.md"
             };
             other.to_owned()
         }
@@ -141,7 +141,7 @@ pub(super) fn failure(failure: PlannerFailure) -> Failure {
         }
         Outcome::NotUnderstood { excerpt, .. } => {
             let help = "if the output complains about the command line or the domain, see \
-                        docs/planners.md for the requirements of this planner";
+                        docs/reference/planners.md for the requirements of this planner";
             with_excerpt(in_words, "its last output", &excerpt, help)
         }
         Outcome::Refused { plan, .. } => {

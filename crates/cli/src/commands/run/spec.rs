@@ -181,11 +181,12 @@ pub(in crate::commands) fn contradiction_failure(error: SpecError) -> Failure {
         SpecError::Problem(wrong) => return Failure::from(wrong.clone()),
         SpecError::World(wrong) => {
             return Failure::from(wrong.clone())
-                .with_default_advice("docs/formats/world.md describes world files");
+                .with_default_advice("docs/reference/formats/world.md describes world files");
         }
         SpecError::Likelihoods(wrong) => {
-            return Failure::from(wrong.clone())
-                .with_default_advice("docs/formats/likelihoods.md describes likelihood files");
+            return Failure::from(wrong.clone()).with_default_advice(
+                "docs/reference/formats/likelihoods.md describes likelihood files",
+            );
         }
         SpecError::Planner(_) => {
             "`elbowroom plan --help` lists the planners; `embedded` is always available, and \

@@ -30,7 +30,7 @@ pub(super) fn run(arguments: &VerifyArgs, source: &Source, output: &mut Output) 
                 "this answer does not claim that no plan exists; `elbowroom check` validates a plan"
             }
             NoPlanAnswerError::Uncertified(_) => {
-                "docs/formats/no-plan.md lists the proofs with certificates"
+                "docs/reference/formats/no-plan.md lists the proofs with certificates"
             }
             _ => "`elbowroom plan DOMAIN PROBLEM --json` prints one",
         };

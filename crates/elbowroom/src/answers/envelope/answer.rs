@@ -1,4 +1,4 @@
-//! The answer as a document: `docs/formats/envelope-json.md`.
+//! The answer as a document: `docs/reference/formats/envelope-json.md`.
 
 use elbowroom_envelope::{Growth, Guarantee, Method};
 use elbowroom_execution::run::TimeoutRule;

@@ -49,7 +49,7 @@ pub struct EndAnswer {
     pub samples: u64,
     /// The verdict of the run.
     pub verdict: String,
-    /// The reason for abandoning the last plan: a word of `docs/formats/trace.md`.
+    /// The reason for abandoning the last plan: a word of `docs/reference/formats/trace.md`.
     pub cause: Option<String>,
     /// The action that caused it.
     pub action: Option<String>,

@@ -213,7 +213,7 @@ fn document_lists_wrong_verdicts_of_val() {
     let Some(val) = Val::find("known") else {
         return;
     };
-    let document = include_str!("../../../../../docs/val-agreement.md");
+    let document = include_str!("../../../../../docs/research/val-agreement.md");
     let (valid, failed) = (PlanVerdict::Valid(None), PlanVerdict::Invalid);
     for (constraint, theirs, ours) in [
         ("(hold-during 2 5 (p))", &valid, &failed),

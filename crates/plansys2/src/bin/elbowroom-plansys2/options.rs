@@ -13,7 +13,7 @@ const ABOUT: &str = "A world for `elbowroom run … --world-process elbowroom-pl
 
 PlanSys2's own executor \
                      must be off: otherwise both executors would choose performers. A second \
-                     elbowroom-plansys2 refuses. docs/plansys2.md describes the sequence.";
+                     elbowroom-plansys2 refuses. docs/reference/plansys2.md describes the sequence.";
 
 /// Command line of the program.
 #[derive(Debug, Parser)]

@@ -1,4 +1,4 @@
-//! Simple reference implementations: the process of `docs/probability.md` with all worlds
+//! Simple reference implementations: the process of `docs/research/probability.md` with all worlds
 //! enumerated, and the enumeration of all orders.
 #![allow(dead_code, reason = "each test uses some of it")]
 
