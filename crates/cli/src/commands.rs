@@ -8,6 +8,7 @@ pub(crate) mod envelope;
 pub(crate) mod export;
 pub(crate) mod init;
 pub(crate) mod learn;
+pub(crate) mod mcp;
 pub(crate) mod network;
 pub(crate) mod odds;
 pub(crate) mod plan;

@@ -52,6 +52,9 @@ pub fn run(line: Vec<OsString>) -> u8 {
         Command::Val(arguments) => commands::val::run(&arguments, &mut output),
         Command::Report(arguments) => commands::report::run(&arguments),
         Command::Completions(arguments) => commands::completions::completions(&arguments),
+        Command::Mcp => commands::mcp::run(),
+        Command::Version => output::print(concat!("elbowroom ", env!("CARGO_PKG_VERSION"), "\n"))
+            .map(|()| Exit::Yes),
         Command::Man(arguments) => commands::completions::man(&arguments),
         Command::Serve(arguments) => commands::serve::run(&arguments, &mut output),
         Command::Ctl(arguments) => commands::ctl::run(&arguments, &mut output),

@@ -88,6 +88,12 @@ fn no_program(name: &str, error: &io::Error) -> String {
         io::ErrorKind::PermissionDenied if path.is_file() => {
             format!("`{name}` is not executable; `chmod +x` makes a script executable")
         }
+        io::ErrorKind::NotFound if path.components().count() > 1 => {
+            "there is no such file; paths are relative to the current folder".to_owned()
+        }
+        io::ErrorKind::NotFound => {
+            format!("there is no program `{name}` on the search path (PATH)")
+        }
         _ => io_error_message(error),
     }
 }

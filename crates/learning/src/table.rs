@@ -71,7 +71,11 @@ fn columns(source: &Source, header: &csv::StringRecord) -> Result<Columns, Diagn
         if !known.clone().any(|name| column.eq_ignore_ascii_case(name)) {
             let names = known.clone().collect::<Vec<_>>().join(", ");
             let mut message = format!("unknown column `{column}`; known are {names}");
-            if let Some(near) = nearest(&column.to_lowercase(), known.clone()) {
+            let separator = [';', '\t'].into_iter().find(|mark| column.contains(*mark));
+            if let Some(mark) = separator {
+                let mark = if mark == ';' { "semicolons" } else { "tabs" };
+                message = format!("the columns are separated by {mark}, expected commas");
+            } else if let Some(near) = nearest(&column.to_lowercase(), known.clone()) {
                 message = format!("{message}; did you mean `{near}`?");
             }
             return Err(error_at(source, place, message));
@@ -107,7 +111,15 @@ fn record(columns: &Columns, row: &csv::StringRecord) -> Result<Record, String> 
         "running" => Outcome::Running,
         other => {
             let known = OUTCOMES.join(", ");
-            return Err(format!("unknown outcome `{other}`; known are {known}"));
+            let meant = match other {
+                "ok" | "success" | "done" => "; did you mean `succeeded`?",
+                "error" | "failure" => "; did you mean `failed`?",
+                "canceled" | "aborted" => "; did you mean `cancelled`?",
+                _ => "",
+            };
+            return Err(format!(
+                "unknown outcome `{other}`; known are {known}{meant}"
+            ));
         }
     };
     let start = optional(Some(columns.start), "start")?;

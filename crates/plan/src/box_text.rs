@@ -64,7 +64,8 @@ pub enum BoxTextError {
 ///
 /// A parameter is written as its name (`dur_0`), and a duration also as its action, `(drive rover
 /// depot shelf)`, or the action's label (`n0`). The name `all` applies to every parameter that is
-/// not named itself. The name is followed by `=` and an interval `[5,12]`, one value `12`, or a
+/// not named itself, and the name of an action of the domain (`drive`) to all of its durations that
+/// are not named themselves. The name is followed by `=` and an interval `[5,12]`, one value `12`, or a
 /// deviation from the nominal value, `±10%` or `±2` (`+-` also works for `±`), which is cut to the
 /// parameter's natural range.
 ///
@@ -73,6 +74,7 @@ pub enum BoxTextError {
 pub fn parse_box(text: &str, plan: &ParametrizedPlan) -> Result<DecoupledEnvelope, BoxTextError> {
     let mut given: Vec<Option<Interval>> = vec![None; plan.parameters.len()];
     let mut of_all = None;
+    let mut of_actions: Vec<(String, Value)> = Vec::new();
     for (name, value) in items(text)? {
         let value = parse_value(&value).ok_or_else(|| BoxTextError::Syntax {
             text: format!("{name}={value}"),
@@ -82,6 +84,14 @@ pub fn parse_box(text: &str, plan: &ParametrizedPlan) -> Result<DecoupledEnvelop
                 if of_all.replace(value).is_some() {
                     return Err(BoxTextError::Duplicate { name });
                 }
+                continue;
+            }
+            Err(BoxTextError::Unknown { .. }) if is_action_name(&name, plan) => {
+                let is_same = |(other, _): &(String, Value)| other.eq_ignore_ascii_case(&name);
+                if of_actions.iter().any(is_same) {
+                    return Err(BoxTextError::Duplicate { name });
+                }
+                of_actions.push((name, value));
                 continue;
             }
             found => found?,
@@ -97,7 +107,13 @@ pub fn parse_box(text: &str, plan: &ParametrizedPlan) -> Result<DecoupledEnvelop
     let mut envelope = DecoupledEnvelope::point(&plan.nominal());
     for (index, parameter) in plan.parameters.iter().enumerate() {
         let own = given[index].take();
-        let interval = own.or_else(|| of_all.as_ref().map(|all| all.around(parameter)));
+        let action = schema_name(parameter, plan);
+        let of_action = of_actions
+            .iter()
+            .find(|(name, _)| action.is_some_and(|action| action.eq_ignore_ascii_case(name)))
+            .map(|(_, value)| value);
+        let shared = of_action.or(of_all.as_ref());
+        let interval = own.or_else(|| shared.map(|value| value.around(parameter)));
         if let Some(interval) = interval {
             if interval.is_empty() {
                 let name = parameter.name.clone();
@@ -218,6 +234,23 @@ impl Value {
             upper: End::Closed(limit(nominal + &reach, range.upper.value(), false)),
         }
     }
+}
+
+/// Returns the name of the action in the domain whose duration the parameter is.
+fn schema_name<'p>(parameter: &Parameter, plan: &'p ParametrizedPlan) -> Option<&'p str> {
+    let ParameterKind::Duration(id) = parameter.kind else {
+        return None;
+    };
+    let name = &plan.plan.instance(id).action.name;
+    name.trim_start_matches('(').split([' ', ')']).next()
+}
+
+/// Returns `true` if a parameter is the duration of an action of the domain with this name.
+fn is_action_name(name: &str, plan: &ParametrizedPlan) -> bool {
+    let mut names = plan.parameters.iter();
+    names.any(|parameter| {
+        schema_name(parameter, plan).is_some_and(|action| action.eq_ignore_ascii_case(name))
+    })
 }
 
 /// Returns the parameter with that name, or the duration of that action.

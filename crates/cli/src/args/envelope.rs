@@ -86,8 +86,9 @@ pub(crate) struct EnvelopeArgs {
     /// some actions: `10x,600; drive=40; (pick a)=3x,5`. --contains rejects a box beyond it
     #[arg(long, value_name = "RULE", value_parser = timeout, allow_negative_numbers = true)]
     pub(crate) timeout: Option<TimeoutRule>,
-    /// Test whether this box is inside the envelope: `"dur_0=[7/4,12] (drive a b)=12 all=±10%"`;
-    /// parameters that are not named keep their nominal value
+    /// Test whether this box is inside the envelope: `"dur_0=[7/4,12] (drive a b)=12 drive=[8,20]
+    /// all=±10%"`, where `drive` stands for all durations of this action; parameters that are not
+    /// named keep their nominal value
     #[arg(long, value_name = "BOX")]
     pub(crate) contains: Option<String>,
     /// Order of the rows: as in the plan (default), or by increasing slack

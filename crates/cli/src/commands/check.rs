@@ -29,6 +29,12 @@ const MARGINS_SHOWN: usize = 8;
 
 /// Checks a problem, or validates a plan for it.
 pub(crate) fn run(arguments: &CheckArgs, output: &mut Output) -> Answer {
+    if arguments.verbose {
+        return Err(Failure::new(
+            "`check` has no option -v",
+            "leave it out, or use `elbowroom val -v`, which prints the events of a plan as VAL does",
+        ));
+    }
     let answer = validate_plan(arguments, output);
     if arguments.diagnostics == DiagnosticsForm::Lines {
         let failed = answer.as_ref().err().map(Failure::diagnostics);

@@ -2,9 +2,7 @@
 
 use std::path::Path;
 
-use clap::CommandFactory;
-
-use crate::args::{CommandLine, CompletionsArgs, ManArgs};
+use crate::args::{self, CompletionsArgs, ManArgs};
 use crate::exit::{Answer, Exit, Failure};
 use crate::output;
 use elbowroom_executive::messages::io_error_message;
@@ -14,7 +12,7 @@ pub(crate) fn completions(arguments: &CompletionsArgs) -> Answer {
     let mut script = Vec::new();
     clap_complete::generate(
         arguments.shell,
-        &mut CommandLine::command(),
+        &mut args::command(),
         "elbowroom",
         &mut script,
     );
@@ -24,7 +22,7 @@ pub(crate) fn completions(arguments: &CompletionsArgs) -> Answer {
 
 /// `elbowroom man`: prints the page of the command, or writes the pages of all commands.
 pub(crate) fn man(arguments: &ManArgs) -> Answer {
-    let command = CommandLine::command();
+    let command = args::command();
     if let Some(folder) = &arguments.folder {
         clap_mangen::generate_to(command, folder).map_err(|error| cannot_write(folder, &error))?;
     } else {

@@ -16,9 +16,11 @@ use std::sync::Arc;
 use elbowroom::RoundingRule;
 use elbowroom::answers::run::RunOutcome;
 use elbowroom::execute::{NamedText, RunInputs, RunSpec, WorldNames, check_vary};
+use elbowroom::execution::Ending;
 use elbowroom::execution::run::{MissingPlan, Verdict};
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
+use elbowroom::sim::{FailureTime, WorldModel};
 use elbowroom_executive::Error;
 use elbowroom_executive::background_planner::BackgroundSettings;
 use elbowroom_executive::clock::Clock;
@@ -377,7 +379,31 @@ impl Job<'_> {
             output::warn(&trouble);
         }
         shown?;
+        if !arguments.json {
+            advise_undone(self.inputs.simulation(), &outcome);
+        }
         exit(&outcome, trace)
+    }
+}
+
+/// Prints a note if the goal became unreachable in a simulation whose failed actions keep the effects
+/// of their starts, because world files often forget `undone`.
+fn advise_undone(world: Option<&WorldModel>, outcome: &RunOutcome) {
+    let (Some(world), Verdict::Unsolvable) = (world, outcome.verdict()) else {
+        return;
+    };
+    let mut executed = outcome.report.executed.iter();
+    let failed = executed.find(|executed| {
+        let has_failed = matches!(executed.ending, Some(Ending::Failed { .. }));
+        let rule = world.failure_rule(&executed.step.action.name);
+        has_failed && rule.is_some_and(|rule| !rule.is_undone && rule.when != FailureTime::AtStart)
+    });
+    if let Some(failed) = failed {
+        let name = &failed.step.action.name;
+        input::note(&format!(
+            "{name} failed and keeps the effects of its start; `undone = true` in its [[failure]] \
+             section reverts them"
+        ));
     }
 }
 

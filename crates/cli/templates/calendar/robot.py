@@ -1,40 +1,35 @@
-"""The robot of this project. Elbowroom starts this program, and both exchange lines of JSON.
+"""The robot of this project, simulated. Elbowroom starts this program, and both exchange lines of JSON.
 
-Here each action only sleeps for about its planned duration, 2000 times as fast as the real clock. Replace the bodies
-of the functions by calls of your robot, and remove `speed`.
+The clock jumps from event to event, so that hours take a second. For a robot, replace `Simulation` by `World`, and each
+function by one with `@world.action(NAME)` that returns when the action is done; the projects of the other templates
+have such a program.
 """
 
-from elbowroom_world import Action, Failed, World
+from elbowroom_world import Action, Failed, Simulation
 
-world = World("courier", speed=2000)
-
-
-def work(action: Action, factor: float = 1.0) -> bool:
-    """Sleeps in ten steps and reports progress. Returns False if the action was cancelled."""
-    for step in range(10):
-        action.feedback(step / 10)
-        if not action.sleep((action.duration or 0) * factor / 10):
-            return False
-    return True
+world = Simulation("courier")
+visits = 0
 
 
-@world.action("drive")
-def drive(action: Action) -> None:
+@world.lasts("drive")
+def drive(action: Action) -> float:
     start, goal = action.arguments
     print(f"drive from {start} to {goal}")  # standard error: standard output belongs to the protocol
-    work(action, 1.1)  # 10 % longer than planned
+    return 1.1 * action.duration  # 10 % longer than planned
 
 
-@world.action("fetch")
-def fetch(action: Action) -> None:
-    goods, shop = action.arguments
-    if not work(action) and not action.is_cancelled:
-        raise Failed(f"{shop} has no {goods}")
+@world.lasts("fetch")
+def fetch(action: Action) -> float:
+    global visits
+    visits += 1
+    if visits > 100:
+        raise Failed("the battery is empty")  # the action does not start
+    return action.duration
 
 
-@world.action("unload")
-def unload(action: Action) -> None:
-    work(action)
+@world.lasts("unload")
+def unload(action: Action) -> float:
+    return 60.0
 
 
 world.run()

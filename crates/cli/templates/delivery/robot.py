@@ -1,12 +1,12 @@
 """The robot of this project. Elbowroom starts this program, and both exchange lines of JSON.
 
-Here each action only sleeps for about its planned duration, 20 times as fast as the real clock. Replace the bodies
+Here each action only sleeps for about its planned duration, 5 times as fast as the real clock. Replace the bodies
 of the functions by calls of your robot, and remove `speed`.
 """
 
 from elbowroom_world import Action, Failed, World
 
-world = World("rover", speed=20)
+world = World("rover", speed=5)
 grip_is_closed = False
 
 

@@ -51,4 +51,4 @@
     :duration (= ?duration 40)
     :condition (and (at start (at ?r ?p)) (at start (idle ?r)) (at start (has-charger ?p)))
     :effect (and (at start (not (idle ?r)))
-                 (at end (assign (battery ?r) 100)) (at end (idle ?r)))))
+                 (at end (assign (battery ?r) 200)) (at end (idle ?r)))))

@@ -9,8 +9,8 @@
     medicine bandages blood - item)
 
   (:init
-    (at robo1 dock) (idle robo1) (empty robo1) (= (battery robo1) 90)
-    (at robo2 dock) (idle robo2) (empty robo2) (= (battery robo2) 50)
+    (at robo1 dock) (idle robo1) (empty robo1) (= (battery robo1) 140)
+    (at robo2 dock) (idle robo2) (empty robo2) (= (battery robo2) 100)
     (lies medicine pharmacy) (lies bandages pharmacy) (lies blood pharmacy)
     (has-charger dock)
 

@@ -1,6 +1,6 @@
 """The robots of this project. Elbowroom starts this program, and both exchange lines of JSON.
 
-Here each action only sleeps for about its planned duration, 50 times as fast as the real clock. Replace the bodies
+Here each action only sleeps for about its planned duration, 10 times as fast as the real clock. Replace the bodies
 of the functions by calls of your robots, and remove `speed`. Actions of several robots run at the same time: each
 call has a thread of its own.
 """
@@ -9,7 +9,7 @@ import random
 
 from elbowroom_world import Action, Failed, World
 
-world = World("hospital", speed=50)
+world = World("hospital", speed=10)
 chance = random.Random(1)
 
 

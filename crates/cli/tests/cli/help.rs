@@ -36,10 +36,10 @@ fn subcommands() -> Vec<String> {
 /// Returns the lines after the options. clap lays out the lines before.
 fn after_the_options(help: &str) -> Vec<&str> {
     let lines: Vec<&str> = help.lines().collect();
-    let last = lines.iter().rposition(|line| line.contains("--version"));
-    lines
-        .into_iter()
-        .skip(last.map_or(0, |last| last + 2))
+    let is_option = |line: &&str| line.trim_start().starts_with('-') && line.contains("--");
+    let last = lines.iter().rposition(is_option).unwrap_or(0);
+    let rest = lines.into_iter().skip(last + 1);
+    rest.skip_while(|line| line.is_empty() || line.starts_with(' '))
         .collect()
 }
 
@@ -53,6 +53,21 @@ fn help_lines_fit_into_80_columns() {
             assert!(line.chars().count() <= 80, "{name:?}: {line}");
         }
     }
+}
+
+/// Long lists of options are found by their headings.
+#[test]
+fn options_of_large_commands_are_in_groups() {
+    let help = help(Some("run"), 80);
+    let headings: Vec<&str> = help
+        .lines()
+        .filter(|line| !line.starts_with(' ') && line.ends_with(':'))
+        .collect();
+    let groups = ["Input:", "Planner:", "World:", "Recording:", "Service:"];
+    for group in groups {
+        assert!(headings.contains(&group), "{headings:?}");
+    }
+    assert_eq!(headings.last(), Some(&"Examples:"), "{headings:?}");
 }
 
 /// Tables in the help must not be wrapped.

@@ -74,6 +74,27 @@ fn links_and_paths_in_documents_exist() {
     assert!(missing.is_empty(), "{}", missing.join("\n"));
 }
 
+/// The map and the site list every document, so that a new one can be found.
+#[test]
+fn map_and_site_list_all_documents() {
+    let docs = root().join("docs");
+    let mut missing = Vec::new();
+    for list in ["README.md", "SUMMARY.md"] {
+        let text = fs::read_to_string(docs.join(list)).expect("the list");
+        let listed: Vec<&str> = links(&text);
+        for document in documents() {
+            let Ok(path) = document.strip_prefix(&docs) else {
+                continue;
+            };
+            let path = path.to_str().expect("a name in UTF-8");
+            if !["README.md", "SUMMARY.md"].contains(&path) && !listed.contains(&path) {
+                missing.push(format!("docs/{list} does not list {path}"));
+            }
+        }
+    }
+    assert!(missing.is_empty(), "{}", missing.join("\n"));
+}
+
 /// A package must contain all of its files. Links to files outside are lost when a repository is
 /// copied in some ways, so the licences are identical copies.
 #[test]

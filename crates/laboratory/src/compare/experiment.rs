@@ -22,7 +22,7 @@ use file::{File, exact, text_of};
 /// Experiment, with the texts of all files that it names.
 #[derive(Clone, Debug)]
 pub struct Experiment {
-    /// The title.
+    /// The title; that of a file without a title is the file's name without its extension.
     pub title: String,
     /// The domain, in PDDL.
     pub domain: String,
@@ -120,6 +120,15 @@ pub struct Published {
     /// Mean number of new plans in successful runs; NaN if there were none.
     #[serde(default)]
     pub replans: Vec<f64>,
+}
+
+/// Returns the name of a file without its folder and extension.
+fn file_stem(name: &str) -> String {
+    let stem = std::path::Path::new(name).file_stem();
+    stem.map_or_else(
+        || name.to_owned(),
+        |stem| stem.to_string_lossy().into_owned(),
+    )
 }
 
 impl Experiment {
@@ -299,7 +308,7 @@ impl Experiment {
         Ok(Self {
             domain: named(&read.domain)?,
             problem: named(&read.problem)?,
-            title: read.title,
+            title: read.title.unwrap_or_else(|| file_stem(source.name())),
             blanks: read
                 .blanks
                 .into_iter()

@@ -115,6 +115,8 @@ impl Reader {
         let near = self
             .report
             .nearest(&word, self.names.objects.keys().map(String::as_str));
+        let near = near.and_then(|near| self.names.objects.get(near));
+        let near = near.map(|id| self.problem.objects[id.index()].name.as_str());
         self.report
             .error(node.span, format!("unknown object `{}`", node.quote()))
             .advise("declare it under `:objects` or `:constants`")

@@ -121,8 +121,8 @@ fn report_lines(report: &mut Report, lines: &LastPlan<'_>) {
     if lines.plans > 1 {
         let place = first(&|_| true).unwrap_or_else(|| span(&(0..0)));
         report
-            .warning(place, format!("{} plans in one text", lines.plans))
-            .label("the last one is read, from here");
+            .warning(place, format!("the file has {} plans", lines.plans))
+            .label("the last one is used, from here");
     }
     // After `step 0: A`, FF prints `1: B`, which looks like a time.
     let is_ff = lines.steps.iter().any(|step| step.form == Form::Ff);

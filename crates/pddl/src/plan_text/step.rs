@@ -252,6 +252,8 @@ impl<'a> StepReader<'a> {
         if found.is_none() {
             let names = self.vocabulary.objects.keys().map(String::as_str);
             let near = self.report.nearest(&name, names);
+            let near = near.and_then(|near| self.vocabulary.objects.get(near));
+            let near = near.map(|id| self.task.problem().objects[id.index()].name.as_str());
             self.report
                 .error(span(&word.range), format!("unknown object `{}`", word.text))
                 .advise("neither the domain nor the problem has an object with this name")

@@ -3,6 +3,7 @@
 mod changes;
 mod failures;
 mod hazards;
+mod number;
 mod section;
 
 use elbowroom_model::Problem;
@@ -41,7 +42,7 @@ pub(super) fn read(source: &Source, problem: &Problem) -> Read<WorldModel> {
     }
     let mut model = WorldModel::without_deviations();
     if let Some(resolution) = &file.resolution {
-        let value = Rational::from_f64_as_written(*resolution.get_ref());
+        let value = resolution.get_ref().exact();
         model.resolution = value
             .filter(Rational::is_positive)
             .ok_or_else(|| reader.error_at(&resolution.span(), "it must be greater than 0"))?;
@@ -290,6 +291,9 @@ impl Reader<'_> {
             toml::Value::Boolean(truth) => NewValue::Truth(*truth),
             toml::Value::Integer(value) => NewValue::Value(Some(Rational::from(*value))),
             toml::Value::Float(value) => NewValue::Value(Rational::from_f64_as_written(*value)),
+            toml::Value::String(text) if text.parse::<Rational>().is_ok() => {
+                NewValue::Value(text.parse().ok())
+            }
             _ => {
                 let message = "write true or false for a fact, or a number for a fluent";
                 return Err(self.error_at(&becomes.span(), message));

@@ -8,8 +8,8 @@ use elbowroom::num::{End, Rational};
 use elbowroom::report::console::wrap;
 use elbowroom::report::exact::Exact;
 use elbowroom_executive::interface::documents::{
-    EndedAction, GoalNow, GoalsNow, GuaranteeNow, HistoryNow, NextNow, PlanNow, State, StepNow,
-    WhatIf,
+    Activity, EndedAction, GoalNow, GoalsNow, GuaranteeNow, HistoryNow, NextNow, PlanNow, State,
+    StepNow, WhatIf,
 };
 use elbowroom_executive::messages::{count_with_noun, escape_control};
 
@@ -101,9 +101,14 @@ pub(super) fn goals(goals: &GoalsNow) -> String {
 }
 
 pub(super) fn state(state: &State) -> String {
+    // The documents keep their older word.
+    let activity = match state.activity {
+        Activity::Resting => "idle".to_owned(),
+        other => other.to_string(),
+    };
     let mut text = format!(
         "{} at {}, plan {}",
-        styled(EMPHASIS, &state.activity.to_string()),
+        styled(EMPHASIS, &activity),
         nearest(&state.now.0),
         state.plans
     );

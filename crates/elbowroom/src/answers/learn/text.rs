@@ -152,7 +152,7 @@ fn predictions(text: &mut String, answer: &LearnAnswer, look: TextLayout) {
     text.push_str(table.fit_to_width(look.width).trim_start_matches('\n'));
 }
 
-/// Appends a table of the changes that no action and no timed initial makes.
+/// Appends a table of the exogenous changes, which no action and no timed initial makes.
 fn changes(text: &mut String, answer: &LearnAnswer, look: TextLayout) {
     if answer.changes.is_empty() {
         return;
@@ -192,7 +192,7 @@ fn changes(text: &mut String, answer: &LearnAnswer, look: TextLayout) {
         notes: Vec::new(),
     };
     text.push('\n');
-    text.push_str("Changes that no action and no timed initial makes:\n\n");
+    text.push_str("Exogenous changes, which no action and no timed initial makes:\n\n");
     text.push_str(table.fit_to_width(look.width).trim_start_matches('\n'));
     for learnt in answer.changes.iter().filter(|it| is_surprising(&it.all)) {
         let becomes = if learnt.becomes { "true" } else { "false" };

@@ -16,7 +16,7 @@ use super::{LinkedParameters, Planning, Published};
 pub(super) struct File {
     pub(super) format: Spanned<String>,
     pub(super) version: Spanned<i64>,
-    pub(super) title: String,
+    pub(super) title: Option<String>,
     pub(super) domain: Spanned<String>,
     pub(super) problem: Spanned<String>,
     pub(super) plan: Option<Spanned<String>>,

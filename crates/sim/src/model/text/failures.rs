@@ -107,7 +107,7 @@ impl Reader<'_> {
         ] {
             for (fluent, value) in numbers {
                 let what = self.template(fluent, NameKind::Functions, action)?;
-                let number = Rational::from_f64_as_written(*value.get_ref());
+                let number = value.get_ref().exact();
                 let number = number
                     .ok_or_else(|| self.error_at(&value.span(), "the number must be finite"))?;
                 let becomes = match how {
@@ -121,7 +121,7 @@ impl Reader<'_> {
         let delay = match &given.delay {
             None => Rational::ZERO,
             Some(delay) => {
-                let seconds = Rational::from_f64_as_written(*delay.get_ref());
+                let seconds = delay.get_ref().exact();
                 let seconds = seconds.filter(|seconds| !seconds.is_negative());
                 let message = "a delay is a number of seconds, and never negative";
                 seconds.ok_or_else(|| self.error_at(&delay.span(), message))?

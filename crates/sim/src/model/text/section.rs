@@ -6,13 +6,15 @@ use std::ops::Range;
 use serde::Deserialize;
 use toml::Spanned;
 
+use super::number::{self, Number};
+
 /// The contents of a file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct File {
     pub(super) format: Spanned<String>,
     pub(super) version: Spanned<i64>,
-    pub(super) resolution: Option<Spanned<f64>>,
+    pub(super) resolution: Option<Spanned<Number>>,
     #[serde(default)]
     pub(super) duration: Vec<Spanned<Section>>,
     #[serde(default)]
@@ -36,42 +38,54 @@ pub(super) struct Section {
     pub(super) fluent: Option<Spanned<String>>,
     pub(super) fact: Option<Spanned<String>>,
     pub(super) becomes: Option<Spanned<toml::Value>>,
+    #[serde(deserialize_with = "number::optional")]
     pub(super) becomes_true_per_second: Option<Spanned<f64>>,
+    #[serde(deserialize_with = "number::optional")]
     pub(super) becomes_false_per_second: Option<Spanned<f64>>,
+    #[serde(deserialize_with = "number::optional")]
     pub(super) probability: Option<Spanned<f64>>,
     pub(super) when: Option<Spanned<String>>,
     pub(super) undone: Option<Spanned<bool>>,
     pub(super) outcome: Option<Spanned<Vec<Spanned<OutcomeSection>>>>,
     pub(super) reported: Option<Spanned<bool>>,
+    #[serde(deserialize_with = "number::optional")]
     pub(super) constant: Option<Spanned<f64>>,
     pub(super) normal: Option<Spanned<Shape>>,
     pub(super) lognormal: Option<Spanned<Shape>>,
     pub(super) uniform: Option<Spanned<Shape>>,
     pub(super) triangular: Option<Spanned<Shape>>,
+    #[serde(deserialize_with = "number::list")]
     pub(super) values: Option<Spanned<Vec<f64>>>,
+    #[serde(deserialize_with = "number::optional")]
     pub(super) minimum: Option<Spanned<f64>>,
+    #[serde(deserialize_with = "number::optional")]
     pub(super) maximum: Option<Spanned<f64>>,
     pub(super) relative: Option<Spanned<bool>>,
+    #[serde(deserialize_with = "number::optional")]
     pub(super) lost: Option<Spanned<f64>>,
+    #[serde(deserialize_with = "number::optional")]
     pub(super) duplicated: Option<Spanned<f64>>,
+    #[serde(deserialize_with = "number::optional")]
     pub(super) late: Option<Spanned<f64>>,
+    #[serde(deserialize_with = "number::optional")]
     pub(super) contradicted: Option<Spanned<f64>>,
 }
 
 /// Names of facts or fluents with their positions, and numbers.
-pub(super) type Numbers = BTreeMap<Spanned<String>, Spanned<f64>>;
+pub(super) type Numbers = BTreeMap<Spanned<String>, Spanned<Number>>;
 
 /// An outcome of a failure.
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct OutcomeSection {
+    #[serde(deserialize_with = "number::optional")]
     pub(super) probability: Option<Spanned<f64>>,
     pub(super) becomes_true: Vec<Spanned<String>>,
     pub(super) becomes_false: Vec<Spanned<String>>,
     pub(super) assign: Numbers,
     pub(super) increase: Numbers,
     pub(super) decrease: Numbers,
-    pub(super) delay: Option<Spanned<f64>>,
+    pub(super) delay: Option<Spanned<Number>>,
     pub(super) reported: Option<Spanned<bool>>,
 }
 
@@ -79,12 +93,19 @@ pub(super) struct OutcomeSection {
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct Shape {
+    #[serde(deserialize_with = "number::plain")]
     pub(super) mean: Option<f64>,
+    #[serde(deserialize_with = "number::plain")]
     pub(super) deviation: Option<f64>,
+    #[serde(deserialize_with = "number::plain")]
     pub(super) from: Option<f64>,
+    #[serde(deserialize_with = "number::plain")]
     pub(super) to: Option<f64>,
+    #[serde(deserialize_with = "number::plain")]
     pub(super) mode: Option<f64>,
+    #[serde(deserialize_with = "number::optional")]
     pub(super) minimum: Option<Spanned<f64>>,
+    #[serde(deserialize_with = "number::optional")]
     pub(super) maximum: Option<Spanned<f64>>,
 }
 
