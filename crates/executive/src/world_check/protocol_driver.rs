@@ -363,9 +363,15 @@ impl ProtocolDriver {
             .record_violation(check, format!("{}: {why}", excerpt(line)));
     }
 
-    fn note_time(&mut self, now: Rational, until: Option<&Rational>, is_silent: bool) {
+    fn note_time(&mut self, mut now: Rational, until: Option<&Rational>, is_silent: bool) {
         self.findings.mark_done(Check::KeepsTime);
         let (was, is) = (self.now.to_f64(), now.to_f64());
+        // The program may use floating-point numbers, as in a run.
+        for exact in [&self.now].into_iter().chain(until) {
+            if exact.to_f64().total_cmp(&is).is_eq() {
+                now.clone_from(exact);
+            }
+        }
         if now < self.now {
             let why = format!("its time went back from {was} to {is}");
             self.findings.record_violation(Check::KeepsTime, why);

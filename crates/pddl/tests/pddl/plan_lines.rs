@@ -205,7 +205,7 @@ proptest! {
             Ok((plan, notes)) if text.is_empty() => {
                 prop_assert!(plan.steps.len() == PLAN.len() && notes.is_empty());
             }
-            Ok((_, notes)) => prop_assert!(notes[0].message.contains("2 plans in one text"), "{lines}"),
+            Ok((_, notes)) => prop_assert!(notes[0].message.contains("the file has 2 plans"), "{lines}"),
             Err(found) => prop_assert!(found.errors().all(|error| error.line() == at + 1), "{found}"),
         }
     }

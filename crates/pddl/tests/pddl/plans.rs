@@ -73,7 +73,7 @@ b (10.000 | 0.100)b (8.000 | 0.200)(G)
     4.001: (walk kitchen hall) [4.000]
     ");
     let (_, warnings) = read(log).unwrap();
-    assert_eq!(warnings[0].message, "2 plans in one text");
+    assert_eq!(warnings[0].message, "the file has 2 plans");
     assert_eq!(warnings[0].line(), 12);
 }
 

@@ -92,7 +92,7 @@ fn words_of_heading_are_not_actions() {
         let read = read_plan(&Source::new("plan", text), &task);
         let (plan, notes) = read.unwrap_or_else(|found| panic!("{}", found.render(false)));
         assert_eq!(plan.steps.len(), 2, "{heading}");
-        assert_eq!(notes[0].message, "2 plans in one text", "{heading}");
+        assert_eq!(notes[0].message, "the file has 2 plans", "{heading}");
     }
     // A line in the notation of Fast Downward.
     let text = "found\nplan\ntime (1)\n";
@@ -104,7 +104,7 @@ fn words_of_heading_are_not_actions() {
 fn last_plan_of_a_log_is_read_with_a_note() {
     let log = "; Plan found with metric 9\n0: (wait) [9]\nnoise\n; Plan found with metric 4\n0: (wait) [4]\n";
     assert_eq!(plan(log), "0.000: (wait) [4.000]");
-    assert_eq!(notes(log), "2 plans in one text");
+    assert_eq!(notes(log), "the file has 2 plans");
     assert_eq!(
         errors("Found plan: 0: (snap b1)\n1: (wait) [1]")
             .split(':')
