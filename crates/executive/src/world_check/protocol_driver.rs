@@ -409,7 +409,7 @@ impl ProtocolDriver {
             let mut wrong = |check, why| self.findings.record_violation(check, why);
             let (is, now) = (time.to_f64(), self.now.to_f64());
             let is_old = *time < before - &Rational::ONE;
-            if *time > self.now {
+            if *time > self.now && is > now {
                 let why = format!("{name}: a report with time {is} arrived too early, at {now}");
                 wrong(Check::ReportsInTime, why);
             } else if is_old && !self.is_recalling {
