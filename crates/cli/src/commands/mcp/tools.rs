@@ -8,8 +8,8 @@ use super::process::{Finished, Question, Stopped};
 use super::{INVALID_PARAMETERS, Refusal};
 
 /// Default and maximum time for a question, in seconds.
-const DEFAULT_LIMIT: u64 = 60;
-const MAX_LIMIT: u64 = 600;
+const DEFAULT_LIMIT: u32 = 60;
+const MAX_LIMIT: u32 = 600;
 
 /// Names of the files of a question.
 const DOMAIN: &str = "domain.pddl";
@@ -137,10 +137,10 @@ pub(super) fn call(
     };
     let needed = |key: &str| text(key)?.ok_or_else(|| wrong(format!("`{key}` is missing")));
     let limit = match arguments.get("time_limit") {
-        None => Duration::from_secs(DEFAULT_LIMIT),
+        None => Duration::from_secs(DEFAULT_LIMIT.into()),
         Some(limit) => limit
             .as_f64()
-            .filter(|seconds| *seconds > 0.0 && *seconds <= MAX_LIMIT as f64)
+            .filter(|seconds| *seconds > 0.0 && *seconds <= f64::from(MAX_LIMIT))
             .map(Duration::from_secs_f64)
             .ok_or_else(|| {
                 wrong(format!(
