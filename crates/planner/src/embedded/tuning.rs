@@ -278,7 +278,7 @@ constants! {
     /// Work without a plan, about a second, after which plans without the last deadlines are
     /// improved until one is in time. The next such detour begins after four times as much. With
     /// half of it, first plans of two of the problems of strangers that other searches find in
-    /// about a second take up to three.
+    /// about a second needed up to three.
     detour_after: u64 = 1_000_000_000;
     /// Number of states of an incomplete search for each one of the complete search. Not measured;
     /// the complete search seldom finds a first plan, but is needed for proofs.
