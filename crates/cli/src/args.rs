@@ -31,6 +31,7 @@ pub(crate) use init::{InitArgs, Template};
 pub(crate) use layout::command;
 pub(crate) use learn::LearnArgs;
 pub(crate) use network::{DurationsChoice, NetworkArgs};
+pub(crate) use number::FaultCount;
 use number::{positive, positive_or_zero};
 pub(crate) use odds::OddsArgs;
 pub(crate) use plan::{EMBEDDED, PlanArgs};

@@ -13,6 +13,7 @@
 //! | is a plan valid? | [`CheckRequest`] | [`CheckAnswer`] |
 //! | which orderings and bounds are necessary? | [`StnRequest`] | [`StnAnswer`] |
 //! | how much may each quantity deviate? | [`EnvelopeRequest`] | [`EnvelopeAnswer`] |
+//! | how many failures does it afford? | [`FaultsRequest`] | [`FaultsAnswer`] |
 //! | for what values does it work? | [`EnvelopeRequest`] | [`RegionAnswer`] |
 //! | which least change makes it work? | [`RepairRequest`] | [`RepairAnswer`] |
 //! | how does its execution end? | [`RunInputs`](crate::execute::RunInputs) | [`RunAnswer`] |
@@ -21,6 +22,7 @@
 
 pub mod check;
 pub mod envelope;
+pub mod faults;
 mod format;
 pub mod learn;
 mod observer;
@@ -35,6 +37,7 @@ mod violation;
 pub use check::{CheckAnswer, CheckRequest};
 pub use elbowroom_report::exact::{self, Exact};
 pub use envelope::{EnvelopeAnswer, EnvelopeOutcome, EnvelopeRequest};
+pub use faults::{FaultsAnswer, FaultsRequest};
 pub use format::Version;
 pub use learn::{LearnAnswer, LearnRequest};
 pub use observer::{

@@ -12,6 +12,7 @@
 //! - [`exact()`]: all values for which a plan works, as a union of polyhedra.
 //! - [`repair()`]: the cheapest change of quantities that makes a plan work.
 //! - [`max_uniform_slack()`]: the deviation that all quantities tolerate at once.
+//! - [`faults`]: the number of failed attempts that a plan affords.
 //! - [`Objection`]: the reason why a box is not inside, with values and a schedule that show it.
 //! - [`explain::Explainer`]: what limits a box, and why a plan fails, in words.
 //! - [`mod@pipeline`]: from a plan with fixed times to a network with open quantities.
@@ -72,6 +73,7 @@ mod cycles;
 mod enforce;
 mod exact;
 pub mod explain;
+pub mod faults;
 mod feasibility;
 mod frontier;
 mod guarantee;

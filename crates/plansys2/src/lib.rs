@@ -2,7 +2,7 @@
 //! network.
 //!
 //! [`World`] is Elbowroom's side, the [world
-//! protocol](https://github.com/elbowroom/elbowroom/blob/main/docs/formats/world-protocol.md) in
+//! protocol](https://github.com/elbowroom/elbowroom/blob/main/docs/reference/formats/world-protocol.md) in
 //! JSON Lines. [`Hub`] is the robots' side, the executor's part on `PlanSys2`'s topic
 //! `actions_hub`. The program `elbowroom-plansys2` connects the two with standard input and output
 //! and with DDS. It is built with the feature `dds`.

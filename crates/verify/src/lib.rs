@@ -53,6 +53,7 @@ mod claim;
 mod conditions;
 mod control;
 mod derive;
+mod faults;
 mod flaw;
 mod given;
 mod intervals;
@@ -74,5 +75,6 @@ pub use certificate::{
 };
 pub use check::{InsideCheck, Verified, verify, with_sums};
 pub use derive::{NotDerived, Plan};
+pub use faults::{FaultsError, VerifiedFaults, verify_faults};
 pub use flaw::Flaw;
 pub use given::{GivenConstraint, GivenInstance, GivenParameter, GivenPlan};

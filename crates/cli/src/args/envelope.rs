@@ -9,7 +9,9 @@ use elbowroom::execution::run::TimeoutRule;
 use elbowroom::num::Rational;
 
 use super::ProblemArgs;
-use super::number::{integer, positive, positive_or_zero, timeout};
+use super::number::{
+    FaultCount, Times, fault_count, integer, positive, positive_or_zero, timeout, times,
+};
 use super::term::term;
 use crate::exit::Failure;
 
@@ -124,6 +126,17 @@ pub(crate) struct EnvelopeArgs {
     /// With --repair: a quantity that may not change; may be repeated
     #[arg(long, value_name = "SPEC", requires = "repair")]
     pub(crate) keep: Vec<String>,
+    /// The number of failed attempts that the plan affords: whether K failures are affordable, or
+    /// the greatest number; and how much longer durations may be then (docs/reference/failures.md)
+    #[arg(long, value_name = "K|max", value_parser = fault_count, conflicts_with = "repair")]
+    pub(crate) faults: Option<FaultCount>,
+    /// With --faults: greatest number of failures of each action; by default only the sum is limited
+    #[arg(long, value_name = "N", value_parser = integer, requires = "faults")]
+    pub(crate) retries: Option<u64>,
+    /// With --faults: time from a failure to the next start of the action, at least epsilon; by
+    /// default 0
+    #[arg(long, value_name = "LOWER..UPPER", value_parser = times, requires = "faults")]
+    pub(crate) recovery: Option<Times>,
     /// Print the answer as one JSON document
     #[arg(long)]
     pub(crate) json: bool,
@@ -172,6 +185,29 @@ impl EnvelopeArgs {
             ));
         }
         Ok(())
+    }
+
+    /// Rejects options that do not apply to failures.
+    ///
+    /// # Errors
+    /// If such an option is given.
+    pub(crate) fn check_faults(&self) -> Result<(), Failure> {
+        let others = [
+            ("--method exact", self.method == Some(Method::Exact)),
+            ("--contains", self.contains.is_some()),
+            ("--order", self.order.is_some()),
+            ("--volume", self.volume),
+            ("--slice", self.slice.is_some()),
+            ("--projection", self.projection.is_some()),
+            ("--picture", self.picture.is_some()),
+        ];
+        match others.iter().find(|(_, given)| *given) {
+            None => Ok(()),
+            Some((flag, _)) => Err(Failure::new(
+                format!("{flag} cannot be combined with --faults"),
+                format!("leave out --faults, or {flag}"),
+            )),
+        }
     }
 
     /// Returns `true` if the exact region is requested instead of a box.

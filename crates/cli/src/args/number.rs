@@ -51,3 +51,36 @@ pub(super) fn positive_or_zero(text: &str) -> Result<Rational, String> {
         Ok(value)
     }
 }
+
+/// A number of failures, or `max`, the greatest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct FaultCount(pub(crate) Option<usize>);
+
+/// Reads the number of failures of `--faults`.
+pub(super) fn fault_count(text: &str) -> Result<FaultCount, String> {
+    if text == "max" {
+        return Ok(FaultCount(None));
+    }
+    let most = elbowroom::envelope::faults::MAX_FAULTS;
+    match text.parse::<usize>() {
+        Ok(count) if count <= most => Ok(FaultCount(Some(count))),
+        _ => Err(format!("expected a number from 0 to {most}, or `max`")),
+    }
+}
+
+/// An interval of times, such as the recovery from a failure.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Times(pub(crate) [Rational; 2]);
+
+/// Reads `LOWER..UPPER`, or one time.
+pub(super) fn times(text: &str) -> Result<Times, String> {
+    let (lower, upper) = text.split_once("..").unwrap_or((text, text));
+    let times = [
+        positive_or_zero(lower.trim())?,
+        positive_or_zero(upper.trim())?,
+    ];
+    if times[0] > times[1] {
+        return Err("the lower end exceeds the upper end; write it as `LOWER..UPPER`".to_owned());
+    }
+    Ok(Times(times))
+}

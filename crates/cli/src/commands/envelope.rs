@@ -1,6 +1,7 @@
 //! `elbowroom envelope`: tolerated deviations of quantities.
 
 mod exact;
+mod faults;
 mod monitor;
 mod repair;
 mod text;
@@ -24,11 +25,35 @@ pub(crate) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
     if arguments.repair {
         return repair::run(arguments, output);
     }
+    if let Some(count) = arguments.faults {
+        return faults::run(arguments, count, output);
+    }
     if arguments.is_exact()? {
         return exact::run(arguments, output);
     }
-    let (method, best) = arguments.method()?;
     let watch = EnvelopeMonitor::start(arguments);
+    let request = Arc::new(request(arguments, output)?);
+    // The progress line is removed before the answer is printed.
+    let outcome = watch.answer(&request).map_err(failure)?;
+    if arguments.json {
+        output.document(&outcome.answer)?;
+    } else {
+        output::print(&text::text(
+            &request,
+            &outcome,
+            arguments.order.unwrap_or(args::Order::Plan),
+            stdout_layout(),
+        ))?;
+        if matches!(outcome.answer.finding, EnvelopeFinding::Fails(_)) {
+            input::advise_repair();
+        }
+    }
+    Ok(exit(&outcome))
+}
+
+/// Reads the files and options of a request.
+fn request(arguments: &EnvelopeArgs, output: &mut Output) -> Result<EnvelopeRequest, Failure> {
+    let (method, best) = arguments.method()?;
     let task = input::task(&arguments.problem, &arguments.epsilon, output)?;
     let mut vary = specifications(&arguments.vary)?;
     vary.extend(specifications(&args::controllable(
@@ -38,7 +63,7 @@ pub(crate) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
     let world = arguments.world.as_deref();
     let world = world.map(|path| input::world(path, &task)).transpose()?;
     let search = Search::default();
-    let request = EnvelopeRequest {
+    Ok(EnvelopeRequest {
         name: arguments.plan.display().to_string(),
         vary,
         guarantee: arguments.guarantee.unwrap_or_default(),
@@ -62,24 +87,7 @@ pub(crate) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
         },
         world: world.map(Arc::new),
         ..EnvelopeRequest::new(&Arc::new(task), plan)
-    };
-    let request = Arc::new(request);
-    // The progress line is removed before the answer is printed.
-    let outcome = watch.answer(&request).map_err(failure)?;
-    if arguments.json {
-        output.document(&outcome.answer)?;
-    } else {
-        output::print(&text::text(
-            &request,
-            &outcome,
-            arguments.order.unwrap_or(args::Order::Plan),
-            stdout_layout(),
-        ))?;
-        if matches!(outcome.answer.finding, EnvelopeFinding::Fails(_)) {
-            input::advise_repair();
-        }
-    }
-    Ok(exit(&outcome))
+    })
 }
 
 fn exit(outcome: &EnvelopeOutcome) -> Exit {

@@ -1,6 +1,7 @@
 //! `elbowroom verify`: check of a certificate that a box is inside the envelope and the largest one
 //! there, or that no plan exists.
 
+mod faults;
 mod no_plan;
 
 use std::fmt::Write as _;
@@ -27,6 +28,9 @@ use elbowroom::report::console::push_wrapped;
 pub(crate) fn run(arguments: &VerifyArgs, output: &mut Output) -> Answer {
     let source = input::source(&arguments.answer, "answer")?;
     let name = source.name();
+    if faults::is_faults_answer(source.text()) {
+        return faults::run(arguments, &source, output);
+    }
     if no_plan::is_plan_answer(source.text()) {
         return no_plan::run(arguments, &source, output);
     }

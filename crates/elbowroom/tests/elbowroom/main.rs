@@ -11,6 +11,7 @@ mod deorder_sound;
 mod derived_certificates;
 mod execution;
 mod export;
+mod faults;
 #[allow(dead_code, unused_imports, reason = "shared with other programs")]
 #[path = "../../../../testing/game.rs"]
 mod game;

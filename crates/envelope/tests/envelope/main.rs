@@ -4,6 +4,7 @@
 mod best;
 mod best_probability;
 mod deordered_plans;
+mod faults;
 mod found_bugs;
 mod given;
 mod irr;
