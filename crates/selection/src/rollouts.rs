@@ -187,7 +187,8 @@ impl<'a> RolloutSession<'a> {
                 planner: &mut *self.planner,
                 made,
             })
-            .with_preparer(preparer);
+            .with_preparer(preparer)
+            .with_stop_check(work::is_stopped);
         let seed = SEED.wrapping_add(sample);
         let report = execution.run_in(&mut *rollouts.world.world(&task, seed));
         Some(report.verdict)
