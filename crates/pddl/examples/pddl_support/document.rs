@@ -100,7 +100,7 @@ states of a plan.
 - The state after the last happening and all timed initials lasts forever: `hold-during` and \
   `hold-after` may extend beyond the end of the plan.
 - `hold-during t u` and `hold-after t` also apply to the state that holds at `t`, which may have \
-  begun earlier. (VAL starts with the first state that begins in the window: [agreement with VAL](val-agreement.md#comparison-with-vals-program).)
+  begun earlier. (VAL starts with the first state that begins in the window: [agreement with VAL](../research/val-agreement.md#comparison-with-vals-program).)
 - Where numbers change continuously, all times count, not only those of happenings. Times are \
   compared exactly; if two of them are less than a millionth apart and one is irrational, the \
   constraint is undecided.
@@ -110,7 +110,7 @@ states of a plan.
 - A plan that violates a constraint is invalid, and the validator reports the time and the reason. In \
   mid-execution, the past states are unknown, so that constraints are undecided.
 - The embedded planner finds plans under all forms \
-  ([details](planners-embedded.md#trajectory-constraints)). Networks and envelopes respect constraints on facts: the happenings that change them keep their order, and \
+  ([details](../research/planners-embedded.md#trajectory-constraints)). Networks and envelopes respect constraints on facts: the happenings that change them keep their order, and \
   deadlines become bounds. Runs and other plans in mid-execution, STN plan files and odds do not \
   support constraints, and reject them.
 
