@@ -46,14 +46,16 @@ function show() {
     showWarnings({}, view, now);
     return;
   }
-  setText(byId("activity"), state.activity);
+  // As in `ctl state`; the documents keep their older word.
+  const activity = state.activity === "resting" ? "idle" : state.activity;
+  setText(byId("activity"), activity);
   byId("activity").className = `activity ${state.activity}`;
   setText(byId("clock"), now.toFixed(1));
   setText(byId("plans"), String(state.plans));
   setText(byId("why"), state.why ? `: ${state.why}` : "");
-  document.title = `${state.activity} – Mission control`;
+  document.title = `${activity} – Mission control`;
   const kinds = showWarnings(state, view, now);
-  announce([state.activity, ...kinds]);
+  announce([activity, ...kinds]);
   showGoals(state, now);
   showLanes(state, now, isChanged);
   showSlack(state, now);

@@ -111,7 +111,7 @@ test("its words are those of ctl state, ctl goals, ctl guarantee and ctl next", 
     activities.add(words.state.split(",")[0]);
   }
   assert.ok(compared >= 3 * MOMENTS, `${compared} compared`);
-  assert.ok(["executing", "paused", "resting"].every((it) => activities.has(it)), [...activities].join());
+  assert.ok(["executing", "paused", "idle"].every((it) => activities.has(it)), [...activities].join());
   await close(tab);
   await end(own);
 });
