@@ -10,7 +10,7 @@ use elbowroom::num::Rational;
 
 use super::ProblemArgs;
 use super::number::{
-    FaultCount, Times, fault_count, integer, positive, positive_or_zero, timeout, times,
+    FaultCount, Times, fault_count, integer, positive, positive_or_zero, retries, timeout, times,
 };
 use super::term::term;
 use crate::exit::Failure;
@@ -131,7 +131,7 @@ pub(crate) struct EnvelopeArgs {
     #[arg(long, value_name = "K|max", value_parser = fault_count, conflicts_with = "repair")]
     pub(crate) faults: Option<FaultCount>,
     /// With --faults: greatest number of failures of each action; by default only the sum is limited
-    #[arg(long, value_name = "N", value_parser = integer, requires = "faults")]
+    #[arg(long, value_name = "N", value_parser = retries, requires = "faults")]
     pub(crate) retries: Option<u64>,
     /// With --faults: time from a failure to the next start of the action, at least epsilon; by
     /// default 0

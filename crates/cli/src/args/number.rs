@@ -22,6 +22,14 @@ pub(super) fn integer(text: &str) -> Result<u64, String> {
         .map_err(|_| format!("it must be a whole number from 0 to {}", u64::MAX))
 }
 
+/// Greatest number of failures of an action.
+pub(super) fn retries(text: &str) -> Result<u64, String> {
+    match integer(text)? {
+        0 => Err("it must be at least 1: with 0, no action may fail".to_owned()),
+        number => Ok(number),
+    }
+}
+
 /// A count that can be held in memory.
 pub(super) fn count(text: &str) -> Result<usize, String> {
     let count = integer(text)?;

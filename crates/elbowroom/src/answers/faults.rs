@@ -13,7 +13,7 @@ use elbowroom_envelope::faults::{
 };
 use elbowroom_envelope::{BestSettings, Guarantee, Oracle};
 use elbowroom_num::{End, Interval, Rational};
-use elbowroom_plan::{DecoupledEnvelope, ParameterKind, ParametrizedPlan};
+use elbowroom_plan::{DecoupledEnvelope, Parameter, ParameterKind, ParametrizedPlan};
 use serde::{Deserialize, Serialize};
 
 use super::envelope::{EnvelopeFinding, EnvelopeRequest, NominalFailure, envelope};
@@ -108,6 +108,10 @@ pub struct Faults {
     pub in_box: Afforded,
     /// For each number of failures the slack that is left.
     pub table: Vec<FaultRow>,
+    /// The names of durations that no box lets be longer than planned, such as those that the
+    /// domain ties to an amount. They stay as planned in the rows of the table.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub not_longer: Vec<String>,
     /// Actions without retries.
     pub without_retries: Vec<WithoutRetries>,
     /// The box for the requested number of failures, or for the greatest one.
@@ -139,7 +143,8 @@ pub struct Afforded {
 pub struct FaultRow {
     /// Number of failures.
     pub faults: usize,
-    /// Share of the planned durations by which all of them may be longer: a multiple of 0.1 %.
+    /// The share by which all durations except [`Faults::not_longer`] may exceed the planned ones: a
+    /// multiple of 0.1 %.
     #[serde(with = "exact")]
     pub slack: Rational,
     /// `true` if it is proved that 0.1 % more is too much.
@@ -261,8 +266,8 @@ struct Subject<'a> {
 }
 
 impl Subject<'_> {
-    /// Returns the box in which all durations may be longer by a share, in steps. Their lower ends
-    /// are those of the box found.
+    /// Returns the box whose durations exceed the planned ones by at most a share, in steps, unless
+    /// they [cannot be longer](Self::cannot_be_longer). Their lower ends are those of the box found.
     fn longer(&self, steps: i64) -> DecoupledEnvelope {
         let factor = Rational::new(STEPS + steps, STEPS);
         let pairs = self.plan.parameters.iter().zip(self.found.intervals());
@@ -270,7 +275,11 @@ impl Subject<'_> {
             if !matches!(parameter.kind, ParameterKind::Duration(_)) {
                 return Interval::point(parameter.nominal.clone());
             }
-            let longer = &parameter.nominal * &factor;
+            let longer = if Self::cannot_be_longer(parameter, found) {
+                parameter.nominal.clone()
+            } else {
+                &parameter.nominal * &factor
+            };
             let upper = match parameter.range.upper.value() {
                 Some(most) if *most < longer => parameter.range.upper.clone(),
                 _ => End::Closed(longer),
@@ -282,6 +291,21 @@ impl Subject<'_> {
         });
         DecoupledEnvelope::new(self.plan, intervals.collect())
             .expect("an interval for each parameter")
+    }
+
+    /// Returns `true` if the box found does not exceed the planned duration.
+    fn cannot_be_longer(parameter: &Parameter, found: &Interval) -> bool {
+        found.upper.value() == Some(&parameter.nominal)
+    }
+
+    /// Returns the names of the durations that cannot be longer.
+    fn not_longer(&self) -> Vec<String> {
+        let pairs = self.plan.parameters.iter().zip(self.found.intervals());
+        let fixed = pairs.filter(|(parameter, found)| {
+            matches!(parameter.kind, ParameterKind::Duration(_))
+                && Self::cannot_be_longer(parameter, found)
+        });
+        fixed.map(|(parameter, _)| parameter.name.clone()).collect()
     }
 
     /// Returns the network in a box; `None` if nothing satisfies it.
@@ -428,6 +452,7 @@ fn finding(
         as_planned,
         in_box,
         table,
+        not_longer: subject.not_longer(),
         without_retries,
         box_with_faults,
         box_faults: last.map(|(faults, _)| faults),
@@ -436,8 +461,8 @@ fn finding(
     })))
 }
 
-/// Returns the greatest number of steps up to `most` for which `works` holds; it holds for all
-/// smaller ones, too. `None` if it does not hold for 0.
+/// Returns the greatest number of steps up to `most` for which `works` holds, which must then also
+/// hold for all smaller ones. `None` if it does not hold for 0.
 fn greatest_step(
     most: i64,
     works: &mut dyn FnMut(i64) -> Result<bool, RequestError>,

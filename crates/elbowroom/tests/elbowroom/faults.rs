@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use elbowroom::answers::faults::{Faults, FaultsAnswer, FaultsFinding, FaultsRequest, faults};
 use elbowroom::answers::{EnvelopeRequest, NoObserver};
-use elbowroom::model::Task;
+use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 use elbowroom::pddl::{self, Source};
 use elbowroom::verify::{FaultsError, verify_faults};
@@ -18,8 +18,17 @@ fn answer(case: &str, count: Option<usize>, retries: Option<usize>) -> FaultsAns
     let (problem, _) = pddl::read_problem(&read("domain.pddl"), &read("problem.pddl")).unwrap();
     let task = Arc::new(Task::new(problem));
     let (plan, _) = pddl::read_plan(&read("plan.plan"), &task).unwrap();
+    answer_for(&task, plan, count, retries)
+}
+
+fn answer_for(
+    task: &Arc<Task>,
+    plan: TimeTriggeredPlan,
+    count: Option<usize>,
+    retries: Option<usize>,
+) -> FaultsAnswer {
     let request = FaultsRequest {
-        envelope: EnvelopeRequest::new(&task, plan),
+        envelope: EnvelopeRequest::new(task, plan),
         faults: count,
         retries,
         recovery: [Rational::ZERO, Rational::ZERO],
@@ -50,6 +59,45 @@ fn slack_of_delivery_with_failures_is_that_worked_by_hand() {
     // If each action fails at most once, three failures take 28 at most, and four take 30.
     let own_retries = self::answer("delivery", None, Some(1));
     assert_eq!(found(&own_retries).as_planned.at_least, Some(3));
+}
+
+/// A tank that would overflow must not make the slack of all other durations 0.
+#[test]
+fn durations_that_cannot_be_longer_stay_as_planned() {
+    let read = |text: &str| Source::new("text", text.to_owned());
+    let domain = read(
+        "(define (domain d)
+           (:requirements :durative-actions :numeric-fluents :continuous-effects
+             :timed-initial-literals)
+           (:predicates (free) (full) (there) (open)) (:functions (tank))
+           (:durative-action fill :parameters () :duration (= ?duration 2)
+             :condition (and (at start (free)) (over all (<= (tank) 12)))
+             :effect (and (at start (not (free))) (at end (full)) (increase (tank) (* #t 6))))
+           (:durative-action drive :parameters () :duration (= ?duration 10)
+             :condition (and (at start (full)) (at end (open)))
+             :effect (and (at start (not (full))) (at end (there)))))",
+    );
+    let problem = read(
+        "(define (problem p) (:domain d) (:init (free) (open) (= (tank) 0) (at 34 (not (open))))
+           (:goal (there)))",
+    );
+    let (problem, _) = pddl::read_problem(&domain, &problem).unwrap();
+    let task = Arc::new(Task::new(problem));
+    let plan = read("0: (fill) [2]\n2.001: (drive) [10]\n");
+    let (plan, _) = pddl::read_plan(&plan, &task).unwrap();
+    let answer = answer_for(&task, plan, None, None);
+    let own = found(&answer);
+    let filling = own
+        .box_with_faults
+        .iter()
+        .find(|row| row.action.as_deref() == Some("(fill)"));
+    assert_eq!(own.not_longer, [filling.unwrap().name.clone()]);
+    assert_eq!(filling.unwrap().upper, Rational::from(2));
+    assert!(
+        own.table.iter().all(|row| row.slack.is_positive()),
+        "{own:?}"
+    );
+    assert!(own.table.len() >= 2, "{own:?}");
 }
 
 #[test]

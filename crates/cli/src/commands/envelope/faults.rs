@@ -67,7 +67,7 @@ fn exit(answer: &FaultsAnswer) -> Exit {
     }
 }
 
-/// Returns whether the plan affords so many failures as planned; `None` if that is undecided.
+/// Returns `true` if the plan affords this number of failures with the planned durations; `None` if that is undecided.
 fn verdict(faults: &Faults, count: usize) -> Option<bool> {
     let Afforded {
         at_least, at_most, ..
@@ -123,6 +123,7 @@ fn text(answer: &FaultsAnswer, look: TextLayout) -> String {
     let in_box =
         format!("For all durations in the box of `elbowroom envelope` without --faults: {in_box}.");
     push_wrapped(&mut text, &in_box, 0, look.width);
+    push_not_longer(&mut text, own, look);
     push_table(&mut text, own);
     push_box(&mut text, own);
     if !own.without_retries.is_empty() {
@@ -177,15 +178,36 @@ fn push_defeat(text: &mut String, own: &Faults, look: TextLayout) {
     push_wrapped(text, &line, 0, look.width);
 }
 
+/// Appends the durations that cannot be longer.
+fn push_not_longer(text: &mut String, own: &Faults, look: TextLayout) {
+    let count = own.not_longer.len();
+    if count == 0 {
+        return;
+    }
+    let action_of = |name: &String| {
+        let row = own.box_with_faults.iter().find(|row| row.name == *name);
+        let action = row.and_then(|row| row.action.clone());
+        action.unwrap_or_else(|| name.clone())
+    };
+    let shown = own.not_longer.iter().take(ACTIONS_SHOWN);
+    let mut names: Vec<String> = shown.map(action_of).collect();
+    if count > ACTIONS_SHOWN {
+        names.push(format!("{} more (--json)", count - ACTIONS_SHOWN));
+    }
+    let line = format!("Never longer than planned: {}.", names.join(", "));
+    push_wrapped(text, &line, 0, look.width);
+}
+
 fn push_table(text: &mut String, own: &Faults) {
     if own.table.is_empty() {
         return;
     }
-    let _ = writeln!(
-        text,
-        "\n{}",
-        styled(EMPHASIS, "failures  all durations may be longer by")
-    );
+    let headline = if own.not_longer.is_empty() {
+        "failures  all durations may be longer by"
+    } else {
+        "failures  all other durations may be longer by"
+    };
+    let _ = writeln!(text, "\n{}", styled(EMPHASIS, headline));
     for row in &own.table {
         let percent = (&row.slack * Rational::from(100)).to_decimal(1);
         let mark = if row.exact { "" } else { " or more" };
