@@ -10,7 +10,7 @@
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 
-use elbowroom_model::problem::TimedChange;
+use elbowroom_model::problem::{TimedChange, TimedInitial};
 use elbowroom_model::validate::{self, Verdict, validate_from};
 use elbowroom_model::{Situation, Task};
 use elbowroom_num::work;
@@ -29,8 +29,6 @@ pub(super) struct Detours<'a> {
     task: &'a Task,
     situation: &'a Situation,
     settings: &'a Settings,
-    /// The task without its last deadlines.
-    relaxed: Task,
     /// Work of the search at which the next detour begins.
     next: u64,
     /// Work of the detours so far.
@@ -53,14 +51,13 @@ impl<'a> Detours<'a> {
         situation: &'a Situation,
         settings: &'a Settings,
     ) -> Option<Self> {
-        if !settings.tuning.uses(Technique::Detours) || settings.tuning.only.is_some() {
-            return None;
-        }
-        Some(Self {
+        let is_used = settings.tuning.uses(Technique::Detours) && settings.tuning.only.is_none();
+        let mut timed = task.problem().timed.iter();
+        let has_deadlines = timed.any(|timed| may_be_deadline(timed, situation));
+        (is_used && has_deadlines).then_some(Self {
             task,
             situation,
             settings,
-            relaxed: without_last_deadlines(task, situation)?,
             next: settings.tuning.detour_after,
             counts: Counts::default(),
             has_plan: false,
@@ -131,8 +128,8 @@ impl<'a> Detours<'a> {
                 ControlFlow::Break(())
             }
         };
-        let relaxed = &self.relaxed;
-        let answer = super::search_for_plans(relaxed, None, situation, &settings, &mut report);
+        let relaxed = without_last_deadlines(task, situation);
+        let answer = super::search_for_plans(&relaxed, None, situation, &settings, &mut report);
         if let Some(counts) = answer.counts() {
             self.counts = counts.after(&self.counts);
         }
@@ -206,28 +203,27 @@ fn in_time(
     ))
 }
 
-/// Returns the task without the timed initials after which a fact stays false. Returns `None` if
-/// there are none.
-fn without_last_deadlines(task: &Task, situation: &Situation) -> Option<Task> {
+/// Returns `true` if the timed initial makes a fact false after the situation.
+fn may_be_deadline(timed: &TimedInitial, situation: &Situation) -> bool {
+    matches!(timed.change, TimedChange::Delete(..)) && timed.time > situation.time
+}
+
+/// Returns the task without the timed initials after which a fact stays false.
+fn without_last_deadlines(task: &Task, situation: &Situation) -> Task {
     let mut problem = task.problem().clone();
-    let mut decided = BTreeSet::new();
-    let mut is_last_deadline = vec![false; problem.timed.len()];
-    let mut places: Vec<usize> = (0..problem.timed.len()).collect();
-    places.sort_by(|&a, &b| problem.timed[b].time.cmp(&problem.timed[a].time));
-    for place in places {
-        let timed = &problem.timed[place];
-        let (fact, is_false) = match &timed.change {
-            TimedChange::Add(predicate, arguments) => ((*predicate, arguments.clone()), false),
-            TimedChange::Delete(predicate, arguments) => ((*predicate, arguments.clone()), true),
-            TimedChange::Assign(..) => continue,
+    let mut later = BTreeSet::new();
+    // Those of one time stay in the order of the problem.
+    problem.timed.sort_by(|a, b| a.time.cmp(&b.time));
+    problem.timed.reverse();
+    problem.timed.retain(|timed| {
+        let is_last = match &timed.change {
+            TimedChange::Add(predicate, arguments) | TimedChange::Delete(predicate, arguments) => {
+                later.insert((*predicate, arguments.clone()))
+            }
+            TimedChange::Assign(..) => false,
         };
-        let is_last = decided.insert(fact);
-        is_last_deadline[place] = is_last && is_false && timed.time > situation.time;
-    }
-    if !is_last_deadline.contains(&true) {
-        return None;
-    }
-    let mut is_kept = is_last_deadline.iter().map(|is_last| !is_last);
-    problem.timed.retain(|_| is_kept.next().unwrap_or(true));
-    Some(task.extended(problem))
+        !(is_last && may_be_deadline(timed, situation))
+    });
+    problem.timed.reverse();
+    task.extended(problem)
 }
