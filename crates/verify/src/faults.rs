@@ -216,7 +216,7 @@ impl Network {
         Ok(network)
     }
 
-    /// Returns the time of so many failures of an attempt, and the successful one if requested.
+    /// Returns the time of a number of failures of an attempt, and the successful one if requested.
     fn length(&self, index: usize, failures: usize, and_success: bool) -> Option<Rational> {
         let own = &self.proof.attempts[index];
         let mut length = Rational::ZERO;
@@ -236,7 +236,7 @@ impl Network {
         retries.min(self.proof.faults - layer)
     }
 
-    /// Returns the length of an edge with so many failures, from a layer; `None` if it has no
+    /// Returns the length of an edge with a number of failures, from a layer; `None` if it has no
     /// limit.
     fn edge_length(
         &self,
@@ -270,7 +270,7 @@ impl Network {
     }
 
     /// Returns the lower bound of a requirement between time points that are not fixed, as one
-    /// between starts; `None` if it is an upper bound. The flag tells whether it is exact.
+    /// between starts; `None` if it is an upper bound. The flag is `true` if it is exact.
     fn precedence(&self, own: &Requirement) -> Option<(Precedence, bool)> {
         let least = -&own.bound.0;
         if least.is_negative() {

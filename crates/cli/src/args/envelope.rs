@@ -89,7 +89,7 @@ pub(crate) struct EnvelopeArgs {
     #[arg(long, value_name = "RULE", value_parser = timeout, allow_negative_numbers = true)]
     pub(crate) timeout: Option<TimeoutRule>,
     /// Test whether this box is inside the envelope: `"dur_0=[7/4,12] (drive a b)=12 drive=[8,20]
-    /// all=±10%"`, where `drive` stands for all durations of this action; parameters that are not
+    /// all=±10%"`, where `drive` selects all durations of this action; parameters that are not
     /// named keep their nominal value
     #[arg(long, value_name = "BOX")]
     pub(crate) contains: Option<String>,

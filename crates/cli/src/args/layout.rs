@@ -13,7 +13,7 @@ struct Heading {
 
 const RUNS: &[&str] = &["run", "serve"];
 
-/// The headings, in the order in which the help shows those of a command.
+/// The headings, in the order of the help of a command.
 const HEADINGS: &[Heading] = &[
     Heading {
         commands: &["run", "serve", "envelope", "plan", "odds"],

@@ -10,7 +10,7 @@ use crate::args::{InitArgs, Template};
 use crate::exit::{Answer, Exit, Failure};
 use crate::output;
 
-/// Files of a template, as names and texts. `{name}` stands for the name of the project.
+/// Files of a template, as names and texts. `{name}` is replaced by the name of the project.
 type Files = &'static [(&'static str, &'static str)];
 
 /// Returns the files of these names in one folder of `templates`.

@@ -143,8 +143,8 @@ pub struct Afforded {
 pub struct FaultRow {
     /// Number of failures.
     pub faults: usize,
-    /// The share by which all durations except [`Faults::not_longer`] may exceed the planned ones: a
-    /// multiple of 0.1 %.
+    /// Slack of all durations except [`Faults::not_longer`], as a share of the planned ones: a multiple
+    /// of 0.1 %.
     #[serde(with = "exact")]
     pub slack: Rational,
     /// `true` if it is proved that 0.1 % more is too much.

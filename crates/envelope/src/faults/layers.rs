@@ -5,8 +5,8 @@
 //! latest time at which it happens after at most j failures on the path to it. The layers are
 //! longest paths, computed in topological order.
 //!
-//! What comes after the *start* of an action, but not after its end, waits for the start of the last
-//! attempt. As long as failures are left, this is known only at the end of the action.
+//! A time point after the *start* of an action, but not after its end, waits for the start of the
+//! last attempt. As long as failures are left, this is known only at the end of the action.
 
 use elbowroom_num::Rational;
 use elbowroom_stn::NodeId;

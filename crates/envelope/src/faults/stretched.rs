@@ -9,7 +9,7 @@ use super::FaultNetwork;
 /// Returns a network whose controllability is *sufficient* for at most `k` failures: each action
 /// lasts as long as all its attempts together. `None` if there is no such network.
 ///
-/// What comes after the start of an action that may fail comes after its end, less its least
+/// A time point after the start of an action that may fail comes after its end, less its least
 /// duration. Upper bounds on its start apply to the start less the time of all failures.
 pub fn stretched(network: &FaultNetwork, k: usize) -> Option<UncertainNetwork> {
     let retried = network.retried_at();
