@@ -24,6 +24,9 @@ const DETOUR_SHARE: u64 = 2;
 /// Divisor of the work of a detour: it ends if it has no plan by then.
 const FIRST_PLAN_SHARE: u64 = 2;
 
+/// The search near the best plan.
+const REFINEMENTS: [Technique; 2] = [Technique::Rescheduling, Technique::Repair];
+
 /// Search for plans, with detours.
 pub(super) struct Detours<'a> {
     task: &'a Task,
@@ -97,7 +100,11 @@ impl<'a> Detours<'a> {
         observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> ControlFlow<()> {
         let memory = self.settings.max_memory;
+        let mut tuning = self.settings.tuning.clone();
+        // Some callers switch refinements off. A detour finds its plan by them.
+        tuning.without.retain(|it| !REFINEMENTS.contains(it));
         let settings = Settings {
+            tuning,
             max_memory: memory.saturating_sub(before.counts.memory),
             first_plan_only: false,
             objective: Objective::Makespan,

@@ -331,6 +331,8 @@ fn detour_meets_tight_horizon() {
     let answers = [true, false].map(|detours| {
         let mut tuning = Tuning::default();
         tuning.detour_after = 500_000_000;
+        // As in searches for plans to choose from.
+        tuning.without = vec![Technique::Rescheduling, Technique::Repair];
         if !detours {
             tuning.without.push(Technique::Detours);
         }
