@@ -13,7 +13,7 @@ use crate::control::{ControlConflict, DynamicControl, strong_conflict};
 use crate::cut_generation::{CheckOutcome, fixed_time_cuts, schedule_cut, strategy_cuts};
 use crate::feasibility::{Feasibility, Infeasible, MAX_BRANCHES};
 use crate::objection::Objection;
-use crate::obligations::Refusal;
+use crate::obligations::{Refusal, ensure_not_stopped};
 use crate::reduction::Reduction;
 
 /// Number of parameters above which data about a box is not kept for the next one: the memory would
@@ -120,6 +120,7 @@ impl Controllability {
         envelope: &DecoupledEnvelope,
         moved: Option<BoxEnd>,
     ) -> Result<Option<Uncontrollable>, Refusal> {
+        ensure_not_stopped()?;
         match self {
             Self::Weak(feasibility) => {
                 let found = feasibility.infeasible(envelope, moved);
@@ -160,6 +161,7 @@ impl Controllability {
         envelope: &DecoupledEnvelope,
         most: usize,
     ) -> Result<CheckOutcome, Refusal> {
+        ensure_not_stopped()?;
         match self {
             Self::Weak(feasibility) => {
                 let found = feasibility.infeasible(envelope, None).map_err(too_many)?;

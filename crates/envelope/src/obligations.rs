@@ -20,7 +20,7 @@ mod timeline;
 
 use elbowroom_model::Task;
 use elbowroom_model::ground::{Condition, FluentId};
-use elbowroom_num::Rational;
+use elbowroom_num::{Rational, work};
 
 use crate::linear::Linear;
 use elbowroom_plan::{InstanceId, NodeId, ParameterId, Schedule, StnPlan, Valuation};
@@ -237,6 +237,30 @@ pub enum Refusal {
     /// The plan's network has no schedule at the nominal values.
     #[error("the plan has no schedule at its nominal values")]
     NoNominalSchedule,
+    /// The analysis was ended by a stop request ([`work::Stop`]).
+    #[error("the analysis was interrupted")]
+    Interrupted,
+}
+
+impl Refusal {
+    /// Returns `None` for an analysis that was interrupted.
+    ///
+    /// # Errors
+    /// For any other refusal.
+    pub fn unless_interrupted<T>(analysed: Result<T, Self>) -> Result<Option<T>, Self> {
+        match analysed {
+            Err(Self::Interrupted) => Ok(None),
+            analysed => analysed.map(Some),
+        }
+    }
+}
+
+/// Fails after a stop request. Called before each step that can take long.
+pub(crate) fn ensure_not_stopped() -> Result<(), Refusal> {
+    if work::is_stopped() {
+        return Err(Refusal::Interrupted);
+    }
+    Ok(())
 }
 
 impl Requirement {

@@ -24,7 +24,9 @@ use elbowroom_num::Rational;
 use elbowroom_stn::ConsistentNetwork;
 
 use crate::linear::Linear;
-use crate::obligations::{BadCase, Difference, Obligations, OverAll, Refusal, Requirement};
+use crate::obligations::{
+    BadCase, Difference, Obligations, OverAll, Refusal, Requirement, ensure_not_stopped,
+};
 use crate::reduction::Reduction;
 use certificate::Certificate;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, NodeId, ParametrizedPlan, Schedule, Valuation};
@@ -262,6 +264,7 @@ impl Soundness {
             if is_enough && !is_separation || direct.proofs_hold(envelope, moved) {
                 continue;
             }
+            ensure_not_stopped()?;
             let Some(schedules) = schedules.get() else {
                 return Ok(Vec::new());
             };
@@ -313,6 +316,7 @@ impl Soundness {
             {
                 continue;
             }
+            ensure_not_stopped()?;
             let Some(schedules) = schedules.get() else {
                 return Ok(Vec::new());
             };

@@ -268,7 +268,7 @@ impl Executive {
         self.stop.request();
     }
 
-    /// Executes the run in this thread until it is stopped or fails. Computations of this thread obey the stop request.
+    /// Executes the run in this thread until it is stopped or fails. Computations of this thread obey the stop request, except while a journal is replayed.
     ///
     /// # Errors
     /// When the run cannot be started, was started before, or its world is an object in this process.

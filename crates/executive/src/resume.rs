@@ -37,7 +37,7 @@ use crate::run::{EntryObserver, JournaledOutcome, RunError, RunHost};
 use crate::running_actions::{self, RunningActions};
 use crate::world_connection::{Launch, WorldSource};
 use elapsed::Elapsed;
-use journal_replay::{JournalReplay, ReplayRecorder, ReplayWatcher, ResumedPlanner};
+use journal_replay::{DeferredStop, JournalReplay, ReplayRecorder, ReplayWatcher, ResumedPlanner};
 
 /// Run whose program has died, as its journal describes it.
 pub struct InterruptedRun {
@@ -233,7 +233,10 @@ impl InterruptedRun {
         let buffer = host.open_viewers(spec, task, &operator)?;
         let decorators = Decorators::new(inputs, &operator, &background);
         let outcome = {
+            let mut deferred_stop = DeferredStop::uninstall();
+            deferred_stop.install_after(&replay);
             let recorder = ReplayRecorder {
+                stop: deferred_stop,
                 replay: Arc::clone(&replay),
                 task: Arc::clone(task),
                 writer: JournalWriter::new(task, &mut file, &health, &operator),

@@ -59,6 +59,11 @@ impl Stop {
         STOP.set(Some(self.clone()));
     }
 
+    /// Makes computations of this thread obey no request. Returns the one that they obeyed.
+    pub fn uninstall_for_thread() -> Option<Self> {
+        STOP.take()
+    }
+
     /// Returns the request that computations of this thread obey.
     pub fn current() -> Option<Self> {
         STOP.with_borrow(Clone::clone)

@@ -4,6 +4,7 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use elbowroom_envelope::obligations::Refusal;
 use elbowroom_envelope::pipeline::PipelineError;
 use elbowroom_envelope::{
     BestRun, BestSettings, BestStep, Growth, Guarantee, Method, Objection, Objective, Oracle,
@@ -220,7 +221,13 @@ pub fn grow(
             ControlFlow::Break(())
         }
     });
-    let run = run.map_err(PipelineError::Refused)?;
+    let run = match run {
+        Err(Refusal::Interrupted) => {
+            grown.stop = StopReason::Cancelled;
+            return Ok(grown);
+        }
+        run => run.map_err(PipelineError::Refused)?,
+    };
     if run.is_cancelled && !has_checks {
         grown.stop = StopReason::CheckLimit;
     }

@@ -14,7 +14,7 @@ use elbowroom_execution::{
 use elbowroom_model::ground::Action;
 use elbowroom_model::validate::Verdict;
 use elbowroom_model::{Task, TimeTriggeredPlan};
-use elbowroom_num::{End, Interval, Rational};
+use elbowroom_num::{End, Interval, Rational, work};
 use elbowroom_plan::deorder::{self, Deordered};
 use elbowroom_plan::parametrize::{ParametrizeError, VarySpec, parametrize};
 use elbowroom_plan::partial_order::partial_order;
@@ -86,7 +86,7 @@ impl PlanPreparer<'_> {
     fn flow(&self) -> ControlFlow<()> {
         match &self.may_continue {
             Some(may_continue) if !may_continue() => ControlFlow::Break(()),
-            _ => ControlFlow::Continue(()),
+            _ => flow_until_stop(),
         }
     }
 
@@ -414,7 +414,7 @@ impl RegionOracle for ExactRegion {
             most_checks: Some(MAX_CHECKS * plan.parameters.len()),
             ..SearchSettings::default()
         };
-        let Ok(run) = irr(&mut oracle, &settings, &mut |_| ControlFlow::Continue(())) else {
+        let Ok(run) = irr(&mut oracle, &settings, &mut |_| flow_until_stop()) else {
             return judged();
         };
         let known = run.envelope.map_err(|objection| {
@@ -454,6 +454,14 @@ impl RegionOracle for ExactRegion {
     fn fork(&self) -> Option<Box<dyn RegionOracle>> {
         Some(Box::new(*self))
     }
+}
+
+/// Ends a search after a stop request.
+fn flow_until_stop() -> ControlFlow<()> {
+    if work::is_stopped() {
+        return ControlFlow::Break(());
+    }
+    ControlFlow::Continue(())
 }
 
 fn preparation_error(error: PipelineError) -> PrepareError {

@@ -11,6 +11,7 @@ use elbowroom_envelope::faults::{
     FaultLimit, FaultNetwork, FaultVerdict, MAX_FAULTS, NotRetriable, decide, fault_limit,
     retriable,
 };
+use elbowroom_envelope::obligations::Refusal;
 use elbowroom_envelope::{BestSettings, Guarantee, Oracle};
 use elbowroom_num::{End, Interval, Rational};
 use elbowroom_plan::{DecoupledEnvelope, Parameter, ParameterKind, ParametrizedPlan};
@@ -391,8 +392,9 @@ fn finding(
     let greatest = greatest.floor().as_small().map_or(0, |(steps, _)| steps);
     // The greatest slack at which every schedule is valid.
     let mut steps = greatest_step(greatest, &mut |steps| {
-        let objection = oracle.objection(&subject.longer(steps));
-        Ok(watcher.flow().is_continue() && objection.map_err(PipelineError::Refused)?.is_none())
+        let objection = Refusal::unless_interrupted(oracle.objection(&subject.longer(steps)));
+        let is_inside = objection.map_err(PipelineError::Refused)? == Some(None);
+        Ok(watcher.flow().is_continue() && is_inside)
     })?
     .unwrap_or(0);
     let valid = steps;

@@ -23,6 +23,7 @@ use super::separation::separations;
 use super::timeline::{FluentChange, Reading, Timeline};
 use super::{
     BadCase, Difference, Obligation, Obligations, OverAll, Refusal, Requirement, Substitution,
+    ensure_not_stopped,
 };
 use crate::linear::Linear;
 use elbowroom_plan::{
@@ -124,6 +125,7 @@ struct Compiler<'a> {
 impl Compiler<'_> {
     fn simulate(&self, mut run: Run, obligations: &mut Obligations) -> Result<Progress, Refusal> {
         while let Some(&node) = self.order.get(run.position) {
+            ensure_not_stopped()?;
             if let Some(split) = self.decide_guards(&mut run, node, obligations)? {
                 if self.autonomous.is_some() {
                     return Err(self.guard_depends(node));

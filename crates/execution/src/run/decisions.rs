@@ -22,7 +22,9 @@ const DECISION_WORK: u64 = 10_000;
 const STEP_WORK: u64 = 250;
 
 impl Run<'_> {
-    fn decide(&mut self) -> Decided {
+    /// Lets the executor decide, and records the decision. After a stop request the decision is
+    /// ignored: it may rest on incomplete computations.
+    fn decide(&mut self) -> Result<Decided, Stop> {
         work::spend(DECISION_WORK + STEP_WORK.saturating_mul(self.steps as u64));
         let news = std::mem::take(&mut self.plan_events);
         let as_planned = self.background.belief_of_the_plan(&self.belief);
@@ -31,11 +33,12 @@ impl Run<'_> {
             plan_events: &news,
             belief: as_planned.as_ref().unwrap_or(&self.belief),
         });
+        self.check_stop_request()?;
         self.ports.recorder.record(&Entry::Decided {
             now: &self.now,
             decided: &decided,
         });
-        decided
+        Ok(decided)
     }
 
     /// Makes a decision, and adds its consequences to the work queue.
@@ -47,7 +50,7 @@ impl Run<'_> {
         if self.poll_planner()? || self.handle_requests()? {
             return Ok(());
         }
-        let decided = self.decide();
+        let decided = self.decide()?;
         let is_hindered = match &decided.decision {
             Decision::Start(orders) => !self.may_start(orders),
             decision => *decision == Decision::GoalReached,

@@ -23,14 +23,18 @@ impl Run<'_> {
         }
     }
 
-    /// Takes the answer to [`Next::Plan`]. Answers to requests that are not open are ignored.
+    /// Takes the answer to [`Next::Plan`]. Answers to requests that are not open are ignored. After
+    /// a stop request, an awaited answer is ignored as well: it may be incomplete.
     ///
     /// An answer that arrives while the run waits in the world is recorded at the end of the wait
     /// ([`Event::PlanMade`](crate::Event::PlanMade)), at the present time; the driver can end the
     /// wait early.
     pub fn planned(&mut self, id: RequestId, planned: Planned) {
         if let Some(attempt) = self.agenda.answer_plan(id) {
-            if let Err(stop) = self.process_planner_answer(attempt, planned) {
+            let processed = self
+                .check_stop_request()
+                .and_then(|()| self.process_planner_answer(attempt, planned));
+            if let Err(stop) = processed {
                 self.begin_shutdown(stop);
             }
             return;
@@ -42,13 +46,17 @@ impl Run<'_> {
     }
 
     /// Takes the answer to [`Next::Prepare`]. Answers to requests that are not open are ignored.
+    /// After a stop request, an awaited answer is ignored as well: it may be incomplete.
     ///
     /// An answer that arrives while the run waits in the world is recorded at the end of the wait
     /// ([`Event::PlanReady`](crate::Event::PlanReady)), at the present time; the driver can end the
     /// wait early.
     pub fn prepared(&mut self, id: RequestId, prepared: Result<PreparedPlan, PrepareError>) {
         if let Some(preparation) = self.agenda.answer_preparation(id) {
-            if let Err(stop) = self.take_preparation(*preparation, prepared) {
+            let taken = self
+                .check_stop_request()
+                .and_then(|()| self.take_preparation(*preparation, prepared));
+            if let Err(stop) = taken {
                 self.begin_shutdown(stop);
             }
             return;

@@ -92,8 +92,14 @@ impl Run<'_> {
             if let Some(report) = self.closing.report() {
                 return Next::Over(report.clone());
             }
-            if let Some(question) = self.agenda.question() {
-                return question.clone();
+            if let Some(question) = self.agenda.question().cloned() {
+                if matches!(question, Next::Plan(_) | Next::Prepare(_))
+                    && let Err(stop) = self.check_stop_request()
+                {
+                    self.begin_shutdown(stop);
+                    continue;
+                }
+                return question;
             }
             work::spend(DECISION_WORK);
             let next = self.agenda.pop();

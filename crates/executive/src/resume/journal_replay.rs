@@ -10,6 +10,7 @@ use elbowroom::answers::{Observer, StopRequest};
 use elbowroom::execution::run::RunSnapshot;
 use elbowroom::execution::{Entry, Planner, PlannerAnswer, Recorder};
 use elbowroom::model::{Situation, Task};
+use elbowroom::num::work::Stop;
 use elbowroom::report::trace::{Line, ReplayPlanner, Stored};
 
 use crate::journaling::{JournalHealth, JournalWriter};
@@ -23,6 +24,7 @@ pub(super) struct JournalReplay {
     /// First line that deviates; 0 if there is none.
     difference: AtomicUsize,
     must_end: AtomicBool,
+    is_interrupted: AtomicBool,
 }
 
 impl JournalReplay {
@@ -33,6 +35,7 @@ impl JournalReplay {
             played: AtomicUsize::new(0),
             difference: AtomicUsize::new(0),
             must_end: AtomicBool::new(false),
+            is_interrupted: AtomicBool::new(false),
         };
         replay.look_ahead(0);
         replay
@@ -51,7 +54,11 @@ impl JournalReplay {
             return self.difference().is_none();
         };
         self.look_ahead(index + 1);
-        if !stored.agrees_with(line) && self.difference().is_none() {
+        let is_interrupted = self.is_interrupted.load(Ordering::SeqCst);
+        let is_interrupted_after = stored.is_interrupted_after(is_interrupted);
+        self.is_interrupted
+            .store(is_interrupted_after, Ordering::SeqCst);
+        if !stored.agrees_with(line, is_interrupted) && self.difference().is_none() {
             self.difference.store(index + self.first, Ordering::SeqCst);
         }
         false
@@ -73,8 +80,35 @@ impl JournalReplay {
     }
 }
 
+/// Stop request that computations of this thread obey after the replay of a journal. During the
+/// replay, a computation that ends early would differ from the recorded one.
+pub(super) struct DeferredStop(Option<Stop>);
+
+impl DeferredStop {
+    /// Uninstalls the thread's stop request until the replay is over.
+    pub(super) fn uninstall() -> Self {
+        Self(Stop::uninstall_for_thread())
+    }
+
+    /// Installs the stop request again if the replay is over.
+    pub(super) fn install_after(&mut self, replay: &JournalReplay) {
+        if replay.is_over()
+            && let Some(stop) = self.0.take()
+        {
+            stop.install_for_thread();
+        }
+    }
+}
+
+impl Drop for DeferredStop {
+    fn drop(&mut self) {
+        self.0.iter().for_each(Stop::install_for_thread);
+    }
+}
+
 /// Recorder that compares entries with the journal and writes new ones.
 pub(super) struct ReplayRecorder<'a> {
+    pub(super) stop: DeferredStop,
     pub(super) replay: Arc<JournalReplay>,
     pub(super) task: Arc<Task>,
     pub(super) writer: JournalWriter<'a>,
@@ -85,6 +119,7 @@ impl Recorder for ReplayRecorder<'_> {
         if self.replay.play(&Line::of(&self.task, entry)) {
             self.writer.record(entry);
         }
+        self.stop.install_after(&self.replay);
     }
 
     fn commit(&mut self) {

@@ -161,8 +161,15 @@ impl Line {
 impl Line {
     /// Returns `true` if a replay with this line reproduces the stored line `self`. Fields that
     /// earlier versions did not write are not compared.
-    pub fn agrees_with(&self, replayed: &Self) -> bool {
+    ///
+    /// `is_interrupted` if the line follows an interruption ([`Line::is_interrupted_after`]). Then
+    /// planned times of reports are not compared: a decision that was ended early may have changed
+    /// them.
+    pub fn agrees_with(&self, replayed: &Self, is_interrupted: bool) -> bool {
         match (self, replayed) {
+            (Self::Observed(stored), Self::Observed(replayed)) if is_interrupted => {
+                stored.now == replayed.now && stored.observation == replayed.observation
+            }
             (Self::Resting(stored), Self::Resting(replayed)) if stored.unreached.is_none() => {
                 let unreached = None;
                 *stored
@@ -172,6 +179,16 @@ impl Line {
                     }
             }
             _ => self == replayed,
+        }
+    }
+
+    /// Returns `true` if the lines after this one follow an interruption of the run, given whether
+    /// this line does.
+    pub fn is_interrupted_after(&self, is_interrupted: bool) -> bool {
+        match self {
+            Self::Interrupted(_) => true,
+            Self::Over(_) => false,
+            _ => is_interrupted,
         }
     }
 }

@@ -484,6 +484,7 @@ pub struct Replay {
     line: usize,
     first: usize,
     difference: Option<Difference>,
+    is_interrupted: bool,
     must_end: Arc<AtomicBool>,
 }
 
@@ -496,6 +497,7 @@ impl Replay {
             line: stored.first_number(),
             first: stored.first_number(),
             difference: None,
+            is_interrupted: false,
             must_end: Arc::default(),
         }
         .with_lookahead()
@@ -534,7 +536,9 @@ impl Recorder for Replay {
         };
         self.look_ahead();
         let replayed = Line::of(&self.task, recorded);
-        if stored.agrees_with(&replayed) {
+        let is_interrupted = self.is_interrupted;
+        self.is_interrupted = stored.is_interrupted_after(is_interrupted);
+        if stored.agrees_with(&replayed, is_interrupted) {
             self.line += 1;
         } else {
             self.difference = Some(Difference {

@@ -3,6 +3,7 @@
 use std::ops::ControlFlow;
 use std::time::Duration;
 
+use elbowroom_envelope::obligations::Refusal;
 use elbowroom_envelope::{Oracle, StopReason, Widening, sharpen};
 use elbowroom_plan::DecoupledEnvelope;
 use elbowroom_selection::box_search::{Step, grow};
@@ -65,7 +66,8 @@ pub(super) fn search(
     };
     if how.sharpen && best.is_none() && stop == Stop::Converged {
         let sharp = sharpen(&mut oracle, &envelope, &mut || continue_or_stop(watcher));
-        if let Some(sharp) = sharp.map_err(PipelineError::Refused)? {
+        let sharp = Refusal::unless_interrupted(sharp).map_err(PipelineError::Refused)?;
+        if let Some(sharp) = sharp.flatten() {
             envelope = sharp;
         }
         if let ControlFlow::Break(halt) = watcher.flow() {

@@ -2,6 +2,7 @@
 
 use std::ops::ControlFlow;
 
+use elbowroom_envelope::obligations::Refusal;
 use elbowroom_envelope::{Guarantee, Objection, Oracle, StopReason, irr};
 use elbowroom_num::Rational;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, ParametrizedPlan, Side};
@@ -49,11 +50,11 @@ pub(super) fn value_of_information(
         return Ok(None);
     }
     let weak = Oracle::new(&request.task, subject.plan, Guarantee::Weak);
-    let mut weak = weak.map_err(PipelineError::Refused)?;
     let settings = request.search.settings();
-    let run = irr(&mut weak, &settings, &mut |_| continue_or_stop(watcher))
-        .map_err(PipelineError::Refused)?;
-    let (StopReason::Converged, Ok(weak)) = (run.stop, run.envelope) else {
+    let run =
+        weak.and_then(|mut weak| irr(&mut weak, &settings, &mut |_| continue_or_stop(watcher)));
+    let run = Refusal::unless_interrupted(run).map_err(PipelineError::Refused)?;
+    let Some((StopReason::Converged, Ok(weak))) = run.map(|run| (run.stop, run.envelope)) else {
         return Ok(None);
     };
     let (width, weak_width) = (
@@ -101,7 +102,11 @@ fn unobservable_quantities(
             let mut distance = step.clone();
             for _ in 0..=STEP_DOUBLINGS {
                 let farther = oracle.objection_to_widening(envelope, end, Some(&reach + &distance));
-                match farther.map_err(PipelineError::Refused)? {
+                let farther = Refusal::unless_interrupted(farther);
+                let Some(farther) = farther.map_err(PipelineError::Refused)? else {
+                    break;
+                };
+                match farther {
                     None => distance = &distance + &distance,
                     Some(Objection::Uncontrollable(conflict)) => {
                         unknown.extend(conflict.ends().iter().map(|end| end.parameter));
