@@ -82,7 +82,8 @@ pub struct Needs {
     pub action_values: bool,
     /// The simulation of possible moves ([`RolloutEvaluator`]), if there are no action values.
     pub rollouts: bool,
-    /// The most likely order of the plan's actions. First plans are then compared in that order.
+    /// The most likely order of the plan's actions, by likelihoods. First plans are then compared in
+    /// that order. Executors without this need do not use likelihoods.
     pub orders: bool,
 }
 

@@ -111,7 +111,7 @@ impl Executive {
         }
         spec.planning_time = PlanningTime::Measured;
         make_persistent(&mut spec);
-        spec.check()?;
+        spec.check_new()?;
         if settings.learn.is_some() && settings.journal.is_none() {
             let error = "a model is learnt from the journal, but the run has no journal";
             let advice = "name a journal, or leave out the folder of the model";

@@ -62,6 +62,7 @@ pub(crate) fn run(
         let task = problem.with_epsilon_of(&spec);
         let first = plan.map(|plan| problem.time_triggered(plan)).transpose()?;
         let inputs = RunInputs::of(spec, task, &WorldNames::default())?;
+        inputs.spec().check_new()?;
         let mut execution = inputs.execution(first)?;
         if let Some(callable) = planner {
             let planner = problem.python_planner(callable, watch.flag(), &raised);

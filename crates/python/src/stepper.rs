@@ -64,6 +64,7 @@ impl Stepper {
             let is_stopped = Arc::clone(&stop);
             let inputs = RunInputs::of(spec, task, &WorldNames::default())?;
             let (spec, task) = (inputs.spec(), inputs.task());
+            inputs.spec().check_new()?;
             let mut execution = inputs.execution(first)?.with_explanations();
             execution = execution.with_stop_check(move || is_stopped.load(Ordering::SeqCst));
             execution = if let Some(callable) = planner {

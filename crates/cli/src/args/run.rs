@@ -117,7 +117,8 @@ pub(crate) struct RunArgs {
     #[arg(long, value_name = "NAME", default_value = DEFAULT_EXECUTOR)]
     pub(crate) executor: String,
     /// Probabilities of success and of spontaneous change (docs/reference/formats/likelihoods.md), for the
-    /// executors that use them; without it, everything is certain
+    /// executors that use them (`adaptable`, `lookahead`) and the choice of the first plan; without
+    /// it, everything is certain
     #[arg(long, value_name = "FILE")]
     pub(crate) likelihoods: Option<PathBuf>,
     /// Seed of the world's random numbers

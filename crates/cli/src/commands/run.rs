@@ -168,7 +168,7 @@ pub(super) fn checked(
             "`elbowroom help envelope` lists the quantities for --vary",
         )
     })?;
-    inputs.spec().check().map_err(contradiction_failure)?;
+    inputs.spec().check_new().map_err(contradiction_failure)?;
     Ok((inputs, first))
 }
 

@@ -73,7 +73,7 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
         Some(checked(&arguments.run, spec.clone(), &names, output)?)
     } else {
         check_domain(&domain_text)?;
-        spec.check().map_err(spec::contradiction_failure)?;
+        spec.check_new().map_err(spec::contradiction_failure)?;
         None
     };
     let journal = journal(&arguments.run, RESUME_SERVE)?;

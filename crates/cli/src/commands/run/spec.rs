@@ -7,6 +7,7 @@ use elbowroom::execute::{
     AdversaryError, AdversarySettings, FirstPlan, FirstPlanError, MAX_STATES, NamedText, RunSpec,
     SpecError, WorldNames,
 };
+use elbowroom::execution::executors::EXECUTORS;
 use elbowroom::execution::run::{PlanningTime, RunningRule};
 use elbowroom::model::Problem;
 use elbowroom::num::Rational;
@@ -195,6 +196,18 @@ pub(in crate::commands) fn contradiction_failure(error: SpecError) -> Failure {
         SpecError::UnsupportedFeature(_) => "`elbowroom check` validates plans of such a domain",
         SpecError::NeedsWorld(_) => {
             "give it a world file with --world or --believed, or name another executor"
+        }
+        SpecError::UnusedLikelihoods(_) => {
+            let users = EXECUTORS.iter().filter(|it| it.needs.orders);
+            let users: Vec<_> = users.map(|it| format!("`{}`", it.name)).collect();
+            return Failure::new(
+                error,
+                format!(
+                    "leave out --likelihoods; {} use them. Failures and changes in a world file \
+                     (--world, --believed) are for the other executors",
+                    users.join(" and ")
+                ),
+            );
         }
         SpecError::NeedsEmbedded(_) => "leave out --planner, or the number in the executor's name",
         SpecError::SelfOverlap(_) => "leave out --self-overlap, or --planner",

@@ -465,6 +465,21 @@ impl RunSpec {
         }
     }
 
+    /// Checks a new run: [`RunSpec::check`], and that the likelihoods are used. A recorded run that ignores them is
+    /// resumed.
+    ///
+    /// # Errors
+    /// When the members are inconsistent, or neither the executor nor the choice of the first plan uses the likelihoods.
+    pub fn check_new(&self) -> Result<(), SpecError> {
+        self.check()?;
+        let chooses_by_likelihoods =
+            !self.first_plan.is_shortest() && self.believed_world().is_none();
+        if self.likelihoods.is_some() && !self.executor.needs().orders && !chooses_by_likelihoods {
+            return Err(SpecError::UnusedLikelihoods(self.executor.clone()));
+        }
+        Ok(())
+    }
+
     /// Returns the embedded planner, with the limits of the run and without a clock.
     pub fn embedded(&self) -> Embedded<'static> {
         Embedded {

@@ -34,6 +34,9 @@ pub enum SpecError {
     /// The executor compares plans in the world of a world file, but there is none.
     #[error("`{0}` needs a model of the world")]
     NeedsWorld(ExecutorSpec),
+    /// Likelihoods are given to an executor that does not use them.
+    #[error("`{0}` does not use likelihoods")]
+    UnusedLikelihoods(ExecutorSpec),
     /// The executor compares plans of the embedded planner, but another planner is given.
     #[error("`{0}` needs the embedded planner, because it chooses among its plans")]
     NeedsEmbedded(ExecutorSpec),

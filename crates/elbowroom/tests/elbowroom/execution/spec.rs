@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use elbowroom::answers::run::simulate;
 use elbowroom::answers::{NoObserver, RunAnswer};
-use elbowroom::execute::{AdversarySettings, NamedText, RunInputs, RunSpec, SpecError, WorldNames};
+use elbowroom::execute::{
+    AdversarySettings, FirstPlan, NamedText, RunInputs, RunSpec, SpecError, WorldNames,
+};
 use elbowroom::execution::run::Verdict;
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
@@ -211,6 +213,28 @@ fn inconsistent_settings_are_rejected_before_the_run() {
     );
     let wrong = check(&|spec| spec.planner = "nobody-knows".to_owned());
     assert!(matches!(wrong, Some(SpecError::Planner(_))), "{wrong:?}");
+}
+
+#[test]
+fn likelihoods_that_nothing_uses_are_rejected() {
+    let mut spec = spec();
+    spec.likelihoods = Some(NamedText {
+        name: "likelihoods.toml".to_owned(),
+        text: String::new(),
+    });
+    for (executor, first_plan, is_used) in [
+        ("policy", FirstPlan::Shortest, false),
+        ("live", FirstPlan::Shortest, false),
+        ("live", FirstPlan::Likeliest, true),
+        ("adaptable", FirstPlan::Shortest, true),
+        ("lookahead", FirstPlan::Shortest, true),
+    ] {
+        spec.executor = executor.parse().expect("a correct test");
+        spec.first_plan = first_plan;
+        let checked = spec.check_new();
+        let is_rejected = matches!(checked, Err(SpecError::UnusedLikelihoods(_)));
+        assert_eq!(!is_rejected, is_used, "{executor}: {checked:?}");
+    }
 }
 
 /// The answer and the lines of the trace can be deserialized, and serialized again to the same
