@@ -25,7 +25,7 @@ use super::macros::Macro;
 use super::metric::Draft;
 use super::reads::{read_action, visit_changes, visit_disputed};
 use super::symbols::Symbols;
-use super::tariffs::variants_by_tariffs;
+use super::tariffs::{variants_by_tariffs, with_known_tariffs};
 use super::times::has_fixed_numbers;
 use super::unfolded::unfolded;
 use super::unsupported::{Unsupported, check};
@@ -78,9 +78,12 @@ pub(crate) fn compile(
         unfolded(grounding)
     };
     let grounding = unfolded.as_ref().unwrap_or(folded);
-    let variants = wanted
-        .tuning
-        .uses(Technique::Calendars)
+    let uses_calendars = wanted.tuning.uses(Technique::Calendars);
+    let known = uses_calendars
+        .then(|| with_known_tariffs(task, grounding, situation))
+        .flatten();
+    let situation = known.as_ref().unwrap_or(situation);
+    let variants = uses_calendars
         .then(|| variants_by_tariffs(task, grounding, situation, wanted.metric))
         .flatten();
     let grounding = variants.as_ref().map_or(grounding, |v| &v.grounding);

@@ -13,8 +13,8 @@ use elbowroom_model::ground::{
 };
 use elbowroom_model::problem::Comparison;
 use elbowroom_model::reachability::Grounding;
-use elbowroom_model::{Situation, Task, TimedHappening};
-use elbowroom_num::Rational;
+use elbowroom_model::{RunningAction, Situation, Task, TimedHappening};
+use elbowroom_num::{End, Rational};
 
 use super::metric::ground_metric;
 use super::reads::visit_changes;
@@ -60,6 +60,108 @@ pub(super) fn variants_by_tariffs(
         },
         origins,
     })
+}
+
+/// Returns the situation with constants in place of the tariffs that effects of running actions read, or `None` if
+/// there are no such effects. Tariffs that can change while such an action may end are left.
+pub(super) fn with_known_tariffs(
+    task: &Task,
+    grounding: &Grounding,
+    situation: &Situation,
+) -> Option<Situation> {
+    let mut changed = BTreeSet::new();
+    let running = situation.running.iter().map(|running| &*running.action);
+    for action in running.chain(&grounding.actions) {
+        visit_changes(action, &mut |fluent, _| {
+            changed.insert(fluent);
+        });
+    }
+    let mut known = situation.clone();
+    let mut is_changed = false;
+    for running in &mut known.running {
+        let Some((earliest, latest)) = ends(running, &situation.time) else {
+            continue;
+        };
+        let value_of = |fluent: FluentId| {
+            let is_known = !changed.contains(&fluent);
+            let value =
+                is_known.then(|| value_between(task, situation, fluent, [&earliest, &latest]));
+            value.flatten().map(Expression::Constant)
+        };
+        let mut action = (*running.action).clone();
+        let Body::Durative(body) = &mut action.body else {
+            continue;
+        };
+        let mut end = (*body.end).clone();
+        for effect in &mut end.effects {
+            if let Change::Update { value, .. } = &mut effect.change {
+                *value = value.map_leaves(&mut |leaf| match leaf {
+                    Expression::Fluent(fluent) => value_of(*fluent),
+                    _ => None,
+                });
+            }
+        }
+        if end != *body.end {
+            is_changed = true;
+            body.end = Arc::new(end);
+            running.action = Arc::new(action);
+        }
+    }
+    is_changed.then_some(known)
+}
+
+/// Returns the earliest and the latest possible end of a running action, or `None` without a latest one.
+fn ends(running: &RunningAction, now: &Rational) -> Option<(Rational, Rational)> {
+    let lower = match &running.duration.lower {
+        End::Closed(lower) | End::Open(lower) => &running.start + lower,
+        End::Infinite => now.clone(),
+    };
+    match &running.duration.upper {
+        End::Closed(upper) | End::Open(upper) => {
+            Some((lower.max(now.clone()), &running.start + upper))
+        }
+        End::Infinite => None,
+    }
+}
+
+/// Returns the value of a fluent that only timed initials change, if they do not change it between two times
+/// (inclusive). `None` for a fluent without changes after the situation.
+fn value_between(
+    task: &Task,
+    situation: &Situation,
+    fluent: FluentId,
+    [earliest, latest]: [&Rational; 2],
+) -> Option<Rational> {
+    let mut value = situation.state.values.get(&fluent).cloned();
+    let mut is_tariff = false;
+    for timed in task
+        .timed()
+        .iter()
+        .filter(|timed| timed.time >= situation.time)
+    {
+        for change in &timed.changes {
+            let Change::Update {
+                fluent: other,
+                value: new,
+                ..
+            } = change
+            else {
+                continue;
+            };
+            if *other != fluent {
+                continue;
+            }
+            is_tariff = true;
+            if timed.time > *latest {
+                continue;
+            }
+            match new {
+                Expression::Constant(new) if timed.time < *earliest => value = Some(new.clone()),
+                _ => return None,
+            }
+        }
+    }
+    value.filter(|_| is_tariff)
 }
 
 /// The tariffs that effects read.
@@ -248,7 +350,7 @@ impl Uses {
         for action in &grounding.actions {
             uses.note(action);
         }
-        // Running actions have no variants.
+        // Running actions have no variants. They read only tariffs that may change before they end.
         for running in &situation.running {
             uses.note(&running.action);
             visit_changes(&running.action, &mut |_, value| {

@@ -2,10 +2,12 @@
 
 use std::fmt::Write;
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
+use elbowroom_model::ground::{Change, Expression};
 use elbowroom_model::validate::{Settings as Strictness, Verdict};
-use elbowroom_model::{Situation, Task, validate_from};
-use elbowroom_num::Rational;
+use elbowroom_model::{RunningAction, Situation, Task, validate_from};
+use elbowroom_num::{Interval, Rational};
 use elbowroom_planner::{Answer, Settings, Stopped, Technique, plan};
 use proptest::prelude::*;
 
@@ -78,6 +80,51 @@ fn metric_of_a_timed_fluent_does_not_delay_the_first_plan() {
     assert_eq!(states, alone);
     // All loads are washed while the price is 2.
     assert_eq!(best_cost, Some(Rational::from(16)));
+}
+
+#[test]
+fn known_tariff_at_the_end_of_a_running_action_gives_cheaper_plans() {
+    let task = laundry("");
+    let schema = task.problem().schema("wash").unwrap();
+    let object = |name| task.problem().object(name).unwrap();
+    let wash = task
+        .instantiate(schema, &[object("a"), object("l0")])
+        .unwrap();
+    let state_after = |time: i64, duration: Interval| {
+        let mut situation = Situation::initial(&task);
+        situation.time = Rational::from(time);
+        for effect in &wash.durative().unwrap().start.effects {
+            if let Change::Delete(fact) = effect.change {
+                situation.state.facts.remove(&fact);
+            }
+        }
+        let price = task.fluent_named("(price)").unwrap();
+        situation.state.values.insert(price, Rational::from(2));
+        situation.running.push(RunningAction {
+            action: Arc::new(wash.clone()),
+            start: Rational::from(20),
+            duration,
+        });
+        situation
+    };
+    let cost_after = |situation: &Situation| {
+        let answer = plan(
+            &task,
+            situation,
+            &Settings::default(),
+            &mut |progress| match progress.counts.evaluated {
+                0..3000 => ControlFlow::Continue(()),
+                _ => ControlFlow::Break(()),
+            },
+        );
+        answer.found().and_then(|found| found.metric.clone())
+    };
+    // The price changes at 32, where an action of at most 20 may still be running.
+    let [known, unknown] = [10, 20].map(|most| {
+        let duration = Interval::closed(Rational::from(10), Rational::from(most));
+        cost_after(&state_after(22, duration)).expect("a plan")
+    });
+    assert!(known < unknown, "{known} {unknown}");
 }
 
 #[test]
@@ -191,14 +238,55 @@ impl Draft {
     }
 }
 
+/// Returns the situation at 2 with the first action of some length running since 1, for its duration or up to `more` longer.
+fn with_running_action(draft: &Draft, task: &Task, more: u8) -> Situation {
+    let mut situation = Situation::initial(task);
+    situation.time = Rational::from(2);
+    for timed in task
+        .timed()
+        .iter()
+        .filter(|timed| timed.time <= situation.time)
+    {
+        for change in &timed.changes {
+            if let Change::Update {
+                fluent,
+                value: Expression::Constant(value),
+                ..
+            } = change
+            {
+                situation.state.values.insert(*fluent, value.clone());
+            }
+        }
+    }
+    let number = draft.actions.iter().position(|action| action.0 > 0);
+    let Some(number) = number else {
+        return situation;
+    };
+    let schema = task.problem().schema(&format!("a{number}")).unwrap();
+    let action = task.instantiate(schema, &[]).unwrap();
+    for effect in &action.durative().unwrap().start.effects {
+        if let Change::Delete(fact) = effect.change {
+            situation.state.facts.remove(&fact);
+        }
+    }
+    let duration = Rational::from(i64::from(draft.actions[number].0));
+    let most = &duration + Rational::from(i64::from(more));
+    situation.running.push(RunningAction {
+        action: Arc::new(action),
+        start: Rational::ONE,
+        duration: Interval::closed(duration, most),
+    });
+    situation
+}
+
 /// Returns the answer with tariffs as calendars, or as choices of the search.
-fn answer_with(task: &Task, as_calendars: bool) -> Answer {
+fn answer_with(task: &Task, situation: &Situation, as_calendars: bool) -> Answer {
     let mut settings = Settings::default();
     if !as_calendars {
         settings.tuning.without.push(Technique::Calendars);
     }
     let mut turns = 0;
-    plan(task, &Situation::initial(task), &settings, &mut |_| {
+    plan(task, situation, &settings, &mut |_| {
         turns += 1;
         if turns > 300 {
             ControlFlow::Break(())
@@ -214,19 +302,39 @@ proptest! {
     #[test]
     fn best_cost_with_calendars_is_the_best_one_with_choices(draft in drafts()) {
         let task = draft.task();
-        let answers = [true, false].map(|as_calendars| answer_with(&task, as_calendars));
-        for found in answers.iter().filter_map(Answer::found) {
-            let situation = Situation::initial(&task);
-            let verdict = validate_from(&task, &situation, &found.plan, &Strictness::default());
-            prop_assert!(matches!(verdict, Verdict::Valid(_)), "{verdict:?}");
-        }
-        let best = answers.each_ref().map(|answer| match answer {
-            Answer::Plan { found, stopped: Stopped::Exhausted, .. } => Some(Some(found.value.clone())),
-            Answer::Unsolvable { .. } => Some(None),
-            _ => None,
-        });
-        if let [Some(with), Some(without)] = &best {
-            prop_assert_eq!(with, without, "{}\n{}", describe(&answers[0]), describe(&answers[1]));
-        }
+        check_best_cost(&task, &Situation::initial(&task))?;
     }
+
+    #[test]
+    fn best_cost_beside_a_running_action_is_the_best_one_with_choices(draft in drafts(), more in 0..3_u8) {
+        let task = draft.task();
+        check_best_cost(&task, &with_running_action(&draft, &task, more))?;
+    }
+}
+
+fn check_best_cost(task: &Task, situation: &Situation) -> Result<(), TestCaseError> {
+    let answers = [true, false].map(|as_calendars| answer_with(task, situation, as_calendars));
+    for found in answers.iter().filter_map(Answer::found) {
+        let verdict = validate_from(task, situation, &found.plan, &Strictness::default());
+        prop_assert!(matches!(verdict, Verdict::Valid(_)), "{verdict:?}");
+    }
+    let best = answers.each_ref().map(|answer| match answer {
+        Answer::Plan {
+            found,
+            stopped: Stopped::Exhausted,
+            ..
+        } => Some(Some(found.value.clone())),
+        Answer::Unsolvable { .. } => Some(None),
+        _ => None,
+    });
+    if let [Some(with), Some(without)] = &best {
+        prop_assert_eq!(
+            with,
+            without,
+            "{}\n{}",
+            describe(&answers[0]),
+            describe(&answers[1])
+        );
+    }
+    Ok(())
 }
