@@ -5,13 +5,14 @@
 PROGRAM is `elbowroom`, whose `check` judges each plan. The domain of a problem is `domain.pddl` in its folder, or given as
 DOMAIN:PROBLEM. In a COMMAND, `{domain}`, `{problem}`, `{seconds}` and `{plan}` (a file for the plan, or the beginning of
 its name) are replaced; plans are read from standard output and from files. OUTPUT is a file of comma-separated values, to
-which a line is added for each problem and planner; a second call continues where the first ended. A plan with times in
-three digits is also accepted with `--tolerance` in PROGRAM's `check`. Prints a table with the shortest accepted
-makespans. Standard library only.
+which a line is added for each problem and planner; a second call continues where the first ended. A plan with rounded
+times, or with less than a millisecond between happenings, is also accepted: `--tolerance` and `--epsilon` of PROGRAM's
+`check`. Prints a table with the shortest accepted makespans. Standard library only.
 """
 
 import argparse
 import csv
+import os
 import pathlib
 import re
 import shlex
@@ -19,7 +20,6 @@ import signal
 import subprocess
 import tempfile
 import time
-import os
 
 STEP = re.compile(r"^\s*([0-9.]+):\s*(\(.*?\))\s*(?:\[\s*(?:D:)?([0-9.]+).*?\])?")
 
@@ -46,7 +46,7 @@ def is_accepted(program, domain, problem, steps, folder):
     path = folder / "judged.plan"
     path.write_text("".join(f"{start:.6f}: {name} [{duration:.6f}]\n" for start, name, duration in steps))
     command = [program, "check", domain, problem, str(path)]
-    for extra in ([], ["--tolerance", "0.002"]):
+    for extra in ([], ["--tolerance", "0.002"], ["--epsilon", "0.0001", "--tolerance", "0.0002"]):
         try:
             if subprocess.run(command + extra, capture_output=True, timeout=60).returncode == 0:
                 return True
@@ -59,7 +59,8 @@ def solve(program, command, domain, problem, seconds):
     """Runs a planner. Returns the shortest accepted makespan, the seconds, and the number of rejected plans."""
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
-        words = [word.format(domain=domain, problem=problem, seconds=seconds, plan=folder / "plan") for word in shlex.split(command)]
+        places = {"domain": domain, "problem": problem, "seconds": seconds, "plan": folder / "plan"}
+        words = [word.format(**places) for word in shlex.split(command)]
         begun = time.monotonic()
         process = subprocess.Popen(["taskset", "-c", str(os.cpu_count() - 1), *words], stdout=subprocess.PIPE,
                                    stderr=subprocess.DEVNULL, text=True, cwd=folder, start_new_session=True)
