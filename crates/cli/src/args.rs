@@ -30,7 +30,7 @@ pub(crate) use export::{Bound, ExportArgs, ExportFormat};
 pub(crate) use init::{InitArgs, Template};
 pub(crate) use layout::command;
 pub(crate) use learn::LearnArgs;
-pub(crate) use network::{DurationsChoice, NetworkArgs};
+pub(crate) use network::{DispatchChoice, DurationsChoice, NetworkArgs};
 pub(crate) use number::FaultCount;
 use number::{positive, positive_or_zero};
 pub(crate) use odds::OddsArgs;

@@ -16,20 +16,22 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod allotment;
 mod answer;
+mod best_box;
 mod dispatch;
 mod draws;
+mod law;
 mod reasons;
 mod simulate;
 
 use std::sync::Arc;
 
-use elbowroom_num::Rational;
-use elbowroom_stn::uncertain::Dispatchable;
+use dispatch::Executor;
 
 pub use answer::{
-    Answer, ControllabilityCheck, LinkDuration, Number, Reason, Simulated, Step, Time, Verdict,
-    ViolatedRequirement,
+    Answer, ControllabilityCheck, ControllableBox, LinkDuration, LinkInterval, Number, Reason,
+    Simulated, Step, Time, Verdict, ViolatedRequirement,
 };
 pub use elbowroom_network::*;
 pub use simulate::{Durations, Simulation, SimulationError};
@@ -42,7 +44,11 @@ pub const MAX_BRANCHES: usize = 1 << 12;
 pub struct Request {
     /// Limit on branches in the check of weak controllability.
     pub most_branches: usize,
-    /// Simulated runs, if any.
+    /// Searches for the most probable controllable box if the network is not controllable.
+    pub is_box_requested: bool,
+    /// Distribution of durations, for the box and for simulated runs.
+    pub durations: Durations,
+    /// Simulated runs, if any. They follow the box, if there is one.
     pub simulation: Option<Simulation>,
 }
 
@@ -50,6 +56,8 @@ impl Default for Request {
     fn default() -> Self {
         Self {
             most_branches: MAX_BRANCHES,
+            is_box_requested: false,
+            durations: Durations::Given,
             simulation: None,
         }
     }
@@ -82,9 +90,22 @@ pub fn analyze(file: &NetworkFile, request: &Request) -> Result<Answer, Simulati
         });
         strong = Some(reasons::strong(file));
     }
-    let form: Option<Arc<Dispatchable<Rational>>> = form.and_then(Result::ok).map(Arc::new);
+    let is_executable = dynamic.as_ref().unwrap_or(&consistent).verdict == Verdict::Yes;
+    let best = (request.is_box_requested && !is_executable)
+        .then(|| best_box::find(file, request.durations))
+        .flatten();
     let simulation = match &request.simulation {
-        Some(simulation) => Some(simulate::run(file, form, simulation)?),
+        Some(simulation) => {
+            let form = form.and_then(Result::ok).map(Arc::new);
+            let in_box = || Some(Executor::BestBox(Arc::new(best.as_ref()?.dispatchable()?)));
+            let executor = form.map(Executor::Dispatchable).or_else(in_box);
+            Some(simulate::run(
+                file,
+                executor,
+                simulation,
+                request.durations,
+            )?)
+        }
         None => None,
     };
     Ok(Answer {
@@ -100,6 +121,7 @@ pub fn analyze(file: &NetworkFile, request: &Request) -> Result<Answer, Simulati
         weak,
         dynamic,
         strong,
+        best: best.map(|best| best.describe(file)),
         simulation,
     })
 }

@@ -27,8 +27,12 @@ pub(crate) struct NetworkArgs {
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = integer)]
     #[arg(allow_negative_numbers = true, requires = "simulate")]
     pub(crate) seed: u64,
-    /// Distribution of the durations
-    #[arg(long, value_enum, default_value_t = DurationsChoice::Given, requires = "simulate")]
+    /// Dispatch of a network that is not dynamically controllable; without --simulate, prints the
+    /// box of `best` (default with --simulate: best)
+    #[arg(long, value_enum)]
+    pub(crate) dispatch: Option<DispatchChoice>,
+    /// Distribution of the durations, for --simulate and --dispatch
+    #[arg(long, value_enum, default_value_t = DurationsChoice::Given)]
     pub(crate) durations: DurationsChoice,
     /// Number of branches after which weak controllability, which can be hard, is left undecided
     #[arg(long, value_name = "N", default_value_t = elbowroom::network::MAX_BRANCHES, value_parser = count)]
@@ -37,6 +41,15 @@ pub(crate) struct NetworkArgs {
     /// Print the answer as one JSON document
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// Dispatch of a network that is not dynamically controllable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum DispatchChoice {
+    /// By the most probable box of durations that makes the network dynamically controllable
+    Best,
+    /// As early as the windows allow, without a guarantee
+    Early,
 }
 
 /// The distribution of the durations of contingent links.

@@ -5,12 +5,12 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use elbowroom::network::{
-    self, Answer as Found, ControllabilityCheck, Durations, NetworkFile, Reason, Request,
-    Simulated, Simulation, Verdict,
+    self, Answer as Found, ControllabilityCheck, ControllableBox, Durations, NetworkFile, Reason,
+    Request, Simulated, Simulation, Verdict,
 };
 use serde_json::Value;
 
-use crate::args::{DurationsChoice, NetworkArgs};
+use crate::args::{DispatchChoice, DurationsChoice, NetworkArgs};
 use crate::exit::{Answer, Exit, Failure};
 use crate::input;
 use crate::output::{self, Output};
@@ -22,6 +22,9 @@ use elbowroom_executive::messages::count_with_noun;
 
 /// Maximum number of bounds printed of a reason; `--json` has all.
 const STEPS_SHOWN: usize = 12;
+
+/// Least risk of a link that is printed.
+const LEAST_RISK: f64 = 1e-6;
 
 /// Reads a network, decides its properties, and writes the requested files.
 pub(crate) fn run(arguments: &NetworkArgs, output: &mut Output) -> Answer {
@@ -50,21 +53,31 @@ pub(crate) fn run(arguments: &NetworkArgs, output: &mut Output) -> Answer {
     }
     let request = Request {
         most_branches: arguments.branches,
+        is_box_requested: match arguments.dispatch {
+            None => arguments.simulate.is_some(),
+            Some(choice) => choice == DispatchChoice::Best,
+        },
+        durations: match arguments.durations {
+            DurationsChoice::Given => Durations::Given,
+            DurationsChoice::Uniform => Durations::Uniform,
+        },
         simulation: arguments.simulate.map(|runs| Simulation {
             runs,
             seed: arguments.seed,
-            durations: match arguments.durations {
-                DurationsChoice::Given => Durations::Given,
-                DurationsChoice::Uniform => Durations::Uniform,
-            },
         }),
     };
     let found = network::analyze(&file, &request).map_err(|error| Failure::new(error, ""))?;
+    let is_box_missing = request.is_box_requested && !found.is_executable() && found.best.is_none();
     write_forms(arguments, &file)?;
     if arguments.json {
         output.json(&document(&arguments.file, &found)?)?;
     } else if on_stdout == 0 {
-        output::print(&report(text.name(), &found, stdout_layout()))?;
+        output::print(&report(
+            text.name(),
+            &found,
+            is_box_missing,
+            stdout_layout(),
+        ))?;
     }
     Ok(if found.is_executable() {
         Exit::Yes
@@ -126,7 +139,7 @@ fn write_network(path: &Path, file: &NetworkFile) -> Result<(), Failure> {
 }
 
 /// Renders the answer as text.
-fn report(name: &str, found: &Found, look: TextLayout) -> String {
+fn report(name: &str, found: &Found, is_box_missing: bool, look: TextLayout) -> String {
     let mut text = String::new();
     let mut parts = vec![
         count_with_noun(found.points, "time point"),
@@ -154,6 +167,14 @@ fn report(name: &str, found: &Found, look: TextLayout) -> String {
         let _ = writeln!(text, "  {what:<24}  {}", styled(style, word));
     }
     push_reasons(&mut text, &promises, look);
+    if let Some(best) = &found.best {
+        push_box(&mut text, best, look);
+    } else if is_box_missing {
+        let line = "No box of durations with positive probability was found in which the network \
+                    is dynamically controllable.";
+        text.push('\n');
+        push_wrapped(&mut text, line, 0, look.width);
+    }
     if let Some(simulated) = &found.simulation {
         push_simulated(&mut text, simulated, look);
     }
@@ -234,6 +255,47 @@ fn push_reason(text: &mut String, what: &str, reason: &Reason, look: TextLayout)
     }
 }
 
+/// Appends the bounds on the probability of success, and the links that carry a risk, the riskiest
+/// first.
+fn push_box(text: &mut String, best: &ControllableBox, look: TextLayout) {
+    let title = "Most probable controllable box";
+    let _ = writeln!(text, "\n{}", styled(EMPHASIS, title));
+    let line = format!(
+        "A run succeeds with a probability of at least {} if durations are as in the file, and of at \
+         least {} for any dependence between them: it succeeds while each duration lies in its \
+         interval.",
+        percent_down(best.given),
+        percent_down(best.least)
+    );
+    push_wrapped(text, &line, 0, look.width);
+    let mut links: Vec<_> = best
+        .links
+        .iter()
+        .filter(|link| link.probability < 1.0 - LEAST_RISK)
+        .collect();
+    links.sort_by(|one, other| one.probability.total_cmp(&other.probability));
+    for link in links.iter().take(STEPS_SHOWN) {
+        let line = format!(
+            "{} to {} takes {} to {} ({})",
+            link.activation,
+            link.end,
+            link.lower.short(),
+            link.upper.short(),
+            percent_down(link.probability),
+        );
+        push_wrapped(text, &line, 2, look.width);
+    }
+    if links.len() > STEPS_SHOWN {
+        let more = format!("and {} more (--json has all)", links.len() - STEPS_SHOWN);
+        let _ = writeln!(text, "  {}", styled(SECONDARY, &more));
+    }
+}
+
+/// Formats a probability as a percentage, rounded down.
+fn percent_down(probability: f64) -> String {
+    format!("{:.1}%", (probability * 1000.0).floor() / 10.0)
+}
+
 fn push_simulated(text: &mut String, simulated: &Simulated, look: TextLayout) {
     let percent = |share: f64| format!("{:.1}%", share * 100.0);
     let [least, most] = simulated.interval;
@@ -243,6 +305,7 @@ fn push_simulated(text: &mut String, simulated: &Simulated, look: TextLayout) {
     };
     let executor = match simulated.executor.as_str() {
         "dispatchable" => "by the dispatchable network",
+        "best-box" => "by the dispatchable network of the most probable controllable box",
         _ => "as early as the windows allow, without a guarantee",
     };
     let mut line = format!(

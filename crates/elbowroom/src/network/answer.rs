@@ -38,6 +38,9 @@ pub struct Answer {
     /// Strong controllability: a single schedule works for all durations of the links. `None` for
     /// networks without links.
     pub strong: Option<ControllabilityCheck>,
+    /// Most probable box of durations that makes the network dynamically controllable, if it was
+    /// requested and exists. `None` if the network is controllable for all its durations.
+    pub best: Option<ControllableBox>,
     /// Success rate of simulated dispatch.
     pub simulation: Option<Simulated>,
 }
@@ -142,6 +145,36 @@ pub struct Time {
     pub time: Number,
 }
 
+/// Box of durations that makes a network dynamically controllable.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ControllableBox {
+    /// Lower bound on the probability of success, whatever the dependence between the durations:
+    /// one minus the sum of the risks of all links.
+    pub least: f64,
+    /// Lower bound on the probability of success if only the durations of a group of correlated
+    /// links depend on each other.
+    pub given: f64,
+    /// The intervals of the links.
+    pub links: Vec<LinkInterval>,
+    /// Number of exact checks of controllability in the search.
+    pub checks: usize,
+}
+
+/// Interval of durations of a contingent link.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LinkInterval {
+    /// The activation point of the link.
+    pub activation: String,
+    /// The point that the world chooses.
+    pub end: String,
+    /// The least duration.
+    pub lower: Number,
+    /// The greatest duration.
+    pub upper: Number,
+    /// Probability of a duration in the interval.
+    pub probability: f64,
+}
+
 /// A number as an exact text and as the nearest float.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Number {
@@ -191,8 +224,9 @@ pub struct Simulated {
     pub seed: u64,
     /// Distribution of the durations.
     pub durations: Durations,
-    /// `dispatchable` (by the dispatchable network) or `early-first` (as early as the windows
-    /// allow, as if the executor could choose the ends of links).
+    /// `dispatchable` (by the dispatchable network), `best-box` (by the dispatchable network for the
+    /// durations of the most probable box) or `early-first` (as early as the windows allow, as if
+    /// the executor could choose the ends of links).
     pub executor: String,
     /// The number of runs with a duration outside the bounds of its link.
     pub outside: u64,

@@ -10,6 +10,9 @@ use elbowroom_stn::{Minimal, NodeId, Schedule};
 pub(super) enum Executor {
     /// Follows the dispatchable network, as early as it allows.
     Dispatchable(Arc<Dispatchable<Rational>>),
+    /// Follows the dispatchable network for the durations of a box, as early as it allows, also
+    /// when a duration lies outside the box.
+    BestBox(Arc<Dispatchable<Rational>>),
     /// Follows the windows, as early as they allow, as if the executor could choose the ends of
     /// links. It has no guarantee.
     EarlyFirst(Minimal<Rational>),
@@ -37,7 +40,7 @@ pub(super) fn run(
     durations: &[Rational],
 ) -> Option<Schedule<Rational>> {
     let decider = match executor {
-        Executor::Dispatchable(form) => {
+        Executor::Dispatchable(form) | Executor::BestBox(form) => {
             Decider::Dispatcher(Box::new(Dispatcher::new(Arc::clone(form))))
         }
         Executor::EarlyFirst(minimal) => Decider::Windows(minimal),

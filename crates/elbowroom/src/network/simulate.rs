@@ -1,12 +1,10 @@
 //! Simulation of dispatch: its success rate.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 use elbowroom_network::NetworkFile;
 use elbowroom_num::Rational;
 use elbowroom_report::statistics::Proportion;
-use elbowroom_stn::uncertain::Dispatchable;
 use elbowroom_stn::{ConsistentNetwork, ConstraintId};
 use serde::{Deserialize, Serialize};
 
@@ -24,8 +22,6 @@ pub struct Simulation {
     pub runs: u64,
     /// The random seed.
     pub seed: u64,
-    /// Distribution of durations.
-    pub durations: Durations,
 }
 
 /// The distribution of the durations of links.
@@ -58,31 +54,33 @@ pub struct SimulationError {
     pub is_given: bool,
 }
 
-/// Makes the runs. Without a dispatchable form, points happen as early as the windows allow.
+/// Makes the runs. Without an executor, points happen as early as the windows allow.
 pub(super) fn run(
     file: &NetworkFile,
-    form: Option<Arc<Dispatchable<Rational>>>,
+    executor: Option<Executor>,
     simulation: &Simulation,
+    durations: Durations,
 ) -> Result<Simulated, SimulationError> {
-    let draws = Draws::new(file, simulation.seed, simulation.durations)?;
-    let executor = form.map(Executor::Dispatchable).or_else(|| {
+    let draws = Draws::new(file, simulation.seed, durations)?;
+    let executor = executor.or_else(|| {
         let kind = ConsistentNetwork::try_from(file.kind_network()).ok()?;
         Some(Executor::EarlyFirst(kind.minimal()))
     });
     let name = match &executor {
         Some(Executor::Dispatchable(_)) => "dispatchable",
+        Some(Executor::BestBox(_)) => "best-box",
         _ => "early-first",
     };
     let mut proportion = Proportion::default();
     let mut outside = 0;
     let mut broken: BTreeMap<ConstraintId, u64> = BTreeMap::new();
     for number in 0..simulation.runs {
-        let durations = draws.run(number);
-        outside += u64::from(is_outside(file, &durations));
+        let drawn = draws.run(number);
+        outside += u64::from(is_outside(file, &drawn));
         // Without a schedule there is nothing to execute.
         let schedule = executor
             .as_ref()
-            .and_then(|executor| dispatch::run(&file.network, executor, &durations));
+            .and_then(|executor| dispatch::run(&file.network, executor, &drawn));
         let requirements = file.network.requirements();
         let mut is_kept = schedule.is_some();
         for id in requirements.constraint_ids() {
@@ -116,7 +114,7 @@ pub(super) fn run(
         durations: if file.durations.iter().all(Option::is_none) {
             Durations::Uniform
         } else {
-            simulation.durations
+            durations
         },
         executor: name.to_owned(),
         outside,

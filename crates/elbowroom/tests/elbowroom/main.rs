@@ -3,6 +3,7 @@
 
 mod answers;
 mod authors_boxes;
+mod best_boxes;
 mod cases;
 mod ccmmz;
 mod certificates;

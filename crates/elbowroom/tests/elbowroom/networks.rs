@@ -54,11 +54,8 @@ fn answer_text(answer: &Answer) -> String {
 
 fn simulated(file: &NetworkFile, runs: u64, seed: u64, durations: Durations) -> Answer {
     let request = Request {
-        simulation: Some(Simulation {
-            runs,
-            seed,
-            durations,
-        }),
+        durations,
+        simulation: Some(Simulation { runs, seed }),
         ..Request::default()
     };
     analyze(file, &request).expect("durations can be drawn")
@@ -156,11 +153,8 @@ fn an_end_without_limit_and_a_deadline_contradict_each_other() {
     );
     // There is no uniform distribution between 1 and infinity.
     let request = Request {
-        simulation: Some(Simulation {
-            runs: 1,
-            seed: 0,
-            durations: Durations::Uniform,
-        }),
+        durations: Durations::Uniform,
+        simulation: Some(Simulation { runs: 1, seed: 0 }),
         ..Request::default()
     };
     let refused = analyze(&file, &request).expect_err("no upper bound");
