@@ -51,6 +51,20 @@ pub(crate) fn run(arguments: &NetworkArgs, output: &mut Output) -> Answer {
             "--dispatchable writes the form that an executor uses",
         ));
     }
+    if arguments.simulate.is_none() && arguments.dispatch != Some(DispatchChoice::Best) {
+        if arguments.dispatch.is_some() {
+            return Err(Failure::new(
+                "--dispatch early only changes simulated runs",
+                "add --simulate N",
+            ));
+        }
+        if arguments.durations == DurationsChoice::Uniform {
+            return Err(Failure::new(
+                "--durations only changes simulated runs and the box of --dispatch best",
+                "add --simulate N or --dispatch best",
+            ));
+        }
+    }
     let request = Request {
         most_branches: arguments.branches,
         is_box_requested: match arguments.dispatch {

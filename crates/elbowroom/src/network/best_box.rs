@@ -1,9 +1,8 @@
-//! Most probable box of durations in which a network is dynamically controllable.
+//! Most probable box of durations that makes a network dynamically controllable.
 //!
 //! The search is conflict-directed (Wang & Williams, AAAI 2015): the exact check of a box returns a
 //! conflict, a cycle of negative length. The cycle is a linear condition on the ends of the
-//! intervals, and the allotment of risk satisfies all conditions so far with the greatest
-//! probability. A conflict may also be resolved by bounds for which its cycle is no longer
+//! intervals. The allotment of risk maximises the probability under all conditions so far. A conflict may also be resolved by bounds for which its cycle is no longer
 //! semi-reducible, so the box is not always the most probable one. The box is always controllable.
 
 use elbowroom_network::NetworkFile;
@@ -24,7 +23,7 @@ const WEIGHTS: [f64; 2] = [1e-3, 1e-7];
 /// Amount that is subtracted from a probability for the rounding of floating-point numbers.
 const ROUNDING: f64 = 1e-9;
 
-/// Box of durations in which a network is dynamically controllable.
+/// Box of durations that makes a network dynamically controllable.
 pub(super) struct BestBox {
     /// The network with these bounds.
     pub(super) network: UncertainNetwork<Rational>,
@@ -126,7 +125,7 @@ fn with_intervals(
     UncertainNetwork::new(network.requirements().clone(), links).ok()
 }
 
-/// Returns a decimal unit of which the spread has at least 10^5.
+/// Returns a decimal unit that is at most 10^-5 of the spread.
 fn decimal_unit(spread: f64) -> Rational {
     let mut unit = Rational::ONE;
     let mut size = 1.0;

@@ -15,6 +15,9 @@ const DEVIATIONS: f64 = 8.0;
 /// Multiple of the scale of an exponential tail beyond which it has no relevant mass.
 const TAIL: f64 = 40.0;
 
+/// Greatest shape of a gamma distribution for which rounding errors stay below 10^-9.
+const MAX_SHAPE: f64 = 1e4;
+
 /// Distribution of a duration, cut at 0 because no duration is negative.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Law {
@@ -47,8 +50,9 @@ pub(super) struct Mass {
 }
 
 impl Law {
-    /// Returns the distribution from which the duration of a link is drawn. `None` if it has a
-    /// single value, or the file gives neither a distribution nor an upper bound.
+    /// Returns the distribution of the duration of a link, as in simulated runs. `None` if it has a
+    /// single value or a shape above [`MAX_SHAPE`], or the file gives neither a distribution nor an
+    /// upper bound.
     pub(super) fn of(file: &NetworkFile, id: LinkId, durations: Durations) -> Option<Self> {
         let link = file.network.link(id);
         let given = match durations {
@@ -90,6 +94,7 @@ impl Law {
             ),
             Shape::Uniform { from, to } => (from, to, (to - from) / 4.0),
             Shape::Exponential { from, mean } => (from, from + TAIL * mean, mean),
+            Shape::Gamma { shape, .. } if shape > MAX_SHAPE => return None,
             Shape::Gamma { from, shape, scale } => {
                 let deviation = shape.sqrt() * scale;
                 let most = from + shape * scale + DEVIATIONS * deviation + TAIL * scale;
@@ -198,8 +203,8 @@ impl Law {
 ///
 /// Series for small `x`, continued fraction by Lentz's method otherwise (DLMF 8.11.4 and 8.9.2).
 fn incomplete_gamma(a: f64, x: f64) -> [f64; 2] {
-    /// Limit on terms; far more than needed for full precision with the shapes of durations.
-    const TERMS: u32 = 2_000;
+    /// Limit on terms; more than needed for full precision up to [`MAX_SHAPE`].
+    const TERMS: u32 = 20_000;
     if x <= 0.0 {
         return [0.0, 1.0];
     }
@@ -298,6 +303,20 @@ mod tests {
         close(exponential.mass([0.0, 3.0]).mass, 0.632_120_558_828_557_7);
         // P(2.5, 2.5) (DLMF 8.2).
         close(gamma.mass([0.5, 3.5]).mass, 0.584_119_813_004_492_3);
+    }
+
+    #[test]
+    fn distribution_without_width_or_with_extreme_shape_has_no_law() {
+        let point = Shape::Normal {
+            mean: 3.0,
+            deviation: 0.0,
+        };
+        let extreme = Shape::Gamma {
+            from: 0.0,
+            shape: 1e5,
+            scale: 1.0,
+        };
+        assert_eq!((Law::new(point), Law::new(extreme)), (None, None));
     }
 
     #[test]
