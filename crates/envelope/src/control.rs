@@ -11,7 +11,9 @@ use elbowroom_num::{Interval, Rational};
 use elbowroom_plan::uncertain::{Impossible, PlanNetwork};
 use elbowroom_plan::{Bound, BoxEnd, DecoupledEnvelope, ParameterId, ParametrizedPlan, Side};
 use elbowroom_stn::Weight;
-use elbowroom_stn::uncertain::{Conflict, Ground, LinkId, Recheck, StrongConflict, Unit};
+use elbowroom_stn::uncertain::{
+    Conflict, EarliestStrategy, Ground, LinkId, Recheck, StrongConflict, Unit,
+};
 
 /// Conflict that makes a network not dynamically controllable: no executor can satisfy it without
 /// knowing values before they are observed.
@@ -71,8 +73,11 @@ pub(crate) struct DynamicControl {
 struct CheckedNetwork {
     envelope: DecoupledEnvelope,
     network: PlanNetwork,
-    unit: Unit,
-    check: Recheck<i64>,
+    /// A sufficient condition for the box. In most plans without waits, starting everything as
+    /// early as possible suffices.
+    earliest: Option<EarliestStrategy<Rational>>,
+    /// The full check; made on the first use if there is an `earliest` strategy.
+    full: Option<(Unit, Recheck<i64>)>,
     /// For each parameter, the link whose bounds are its interval; `None` if the parameter is also
     /// used elsewhere.
     links: Vec<Option<LinkId>>,
@@ -98,23 +103,51 @@ impl DynamicControl {
             Ok(network) => network,
             Err(impossible) => return Some(unsatisfiable(impossible)),
         };
-        let Some(whole) = network.network.to_integer_network() else {
-            let conflict = network.network.conflict()?;
-            return Some(translate_conflict(plan, &network, &grounds_of(&conflict)));
-        };
-        match Recheck::new(whole.network) {
-            Ok(check) => {
-                self.last_network = Some(CheckedNetwork {
-                    envelope: envelope.clone(),
-                    links: links_of(plan, &network),
-                    network,
-                    unit: whole.unit,
-                    check,
-                });
-                None
+        let earliest = EarliestStrategy::new(&network.network);
+        let mut full = None;
+        if earliest.is_none() {
+            let Some(whole) = network.network.to_integer_network() else {
+                let conflict = network.network.conflict()?;
+                return Some(translate_conflict(plan, &network, &grounds_of(&conflict)));
+            };
+            match Recheck::new(whole.network) {
+                Ok(check) => full = Some((whole.unit, check)),
+                Err(conflict) => {
+                    return Some(translate_conflict(plan, &network, &grounds_of(&conflict)));
+                }
             }
-            Err(conflict) => Some(translate_conflict(plan, &network, &grounds_of(&conflict))),
         }
+        self.last_network = Some(CheckedNetwork {
+            envelope: envelope.clone(),
+            links: links_of(plan, &network),
+            network,
+            earliest,
+            full,
+        });
+        None
+    }
+
+    /// Returns `true` if the kept network is that of this box.
+    pub(crate) fn is_about(&self, envelope: &DecoupledEnvelope) -> bool {
+        let kept = self.last_network.as_ref();
+        kept.is_some_and(|kept| kept.envelope == *envelope)
+    }
+
+    /// Does the same as [`conflict`](Self::conflict) for a box that differs from the kept one in
+    /// the interval of one parameter only, and keeps that one.
+    pub(crate) fn conflict_if_moved(
+        &mut self,
+        plan: &ParametrizedPlan,
+        envelope: &DecoupledEnvelope,
+        moved: ParameterId,
+    ) -> Option<ControlConflict> {
+        if let Some(kept) = &mut self.last_network
+            && let Some(decided) = kept.probe(moved, envelope.interval(moved))
+        {
+            return decided.map(|grounds| translate_conflict(plan, &kept.network, &grounds));
+        }
+        // The parameter is used elsewhere, or its bounds are large.
+        Self::default().conflict(plan, envelope)
     }
 }
 
@@ -127,12 +160,19 @@ impl CheckedNetwork {
         let Some((index, (_, interval))) = moved.next() else {
             return Rechecked::Controllable;
         };
-        let change = self.links[index].zip(self.bounds(interval));
-        let Some((link, (lower, upper))) = change.filter(|_| moved.next().is_none()) else {
+        let link = self.links[index].filter(|_| moved.next().is_none());
+        let Some(link) = link.filter(|&link| !self.is_early_enough(link, interval)) else {
             return Rechecked::Unknown;
         };
-        match self.check.change(link, lower, upper) {
+        let Some((unit, check)) = self.full_check() else {
+            return Rechecked::Unknown;
+        };
+        let Some((lower, upper)) = bounds(unit, interval) else {
+            return Rechecked::Unknown;
+        };
+        match check.change(link, lower, upper) {
             Ok(()) => {
+                self.earliest = None;
                 self.envelope.clone_from(envelope);
                 Rechecked::Controllable
             }
@@ -140,16 +180,54 @@ impl CheckedNetwork {
         }
     }
 
-    /// Returns the bounds of a link in whole numbers, if they can be represented.
-    fn bounds(&self, interval: &Interval) -> Option<(i64, Option<i64>)> {
-        let lower = self.unit.to_integer(interval.lower.value()?)?;
-        let upper = match interval.upper.value() {
-            Some(upper) => Some(self.unit.to_integer(upper)?),
-            None => None,
-        };
-        let is_in_order = lower >= 0 && upper.is_none_or(|upper| lower <= upper);
-        is_in_order.then_some((lower, upper))
+    /// Returns the conflict that arises if a parameter has this interval, if there is one; `None`
+    /// if that cannot be checked here. The network stays as it is.
+    fn probe(&mut self, moved: ParameterId, interval: &Interval) -> Option<Option<Vec<Ground>>> {
+        let link = self.links[moved.index()]?;
+        if self.is_early_enough(link, interval) {
+            return Some(None);
+        }
+        let old = self.envelope.interval(moved).clone();
+        let (unit, check) = self.full_check()?;
+        let (lower, upper) = bounds(unit, interval)?;
+        let (old_lower, old_upper) = bounds(unit, &old)?;
+        if let Err(conflict) = check.change(link, lower, upper) {
+            return Some(Some(grounds_of(&conflict)));
+        }
+        let restored = check.change(link, old_lower, old_upper);
+        debug_assert!(restored.is_ok(), "the kept box is controllable");
+        Some(None)
     }
+
+    /// Returns `true` if it is known that starting everything as early as possible suffices for
+    /// this interval of a link.
+    fn is_early_enough(&self, link: LinkId, interval: &Interval) -> bool {
+        let (Some(strategy), Some(lower)) = (&self.earliest, interval.lower.value()) else {
+            return false;
+        };
+        !lower.is_negative() && strategy.allows(link, lower, interval.upper.value())
+    }
+
+    /// Returns the check that decides about all bounds; `None` if numbers are too large for it.
+    fn full_check(&mut self) -> Option<(Unit, &mut Recheck<i64>)> {
+        if self.full.is_none() {
+            let whole = self.network.network.to_integer_network()?;
+            self.full = Some((whole.unit, Recheck::new(whole.network).ok()?));
+        }
+        let (unit, check) = self.full.as_mut()?;
+        Some((*unit, check))
+    }
+}
+
+/// Returns the bounds of a link in whole numbers, if they can be represented.
+fn bounds(unit: Unit, interval: &Interval) -> Option<(i64, Option<i64>)> {
+    let lower = unit.to_integer(interval.lower.value()?)?;
+    let upper = match interval.upper.value() {
+        Some(upper) => Some(unit.to_integer(upper)?),
+        None => None,
+    };
+    let is_in_order = lower >= 0 && upper.is_none_or(|upper| lower <= upper);
+    is_in_order.then_some((lower, upper))
 }
 
 /// The result of an incremental controllability check.

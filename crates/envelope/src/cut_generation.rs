@@ -19,7 +19,8 @@ use elbowroom_plan::{
 };
 use elbowroom_stn::ConstraintId;
 use elbowroom_stn::uncertain::{
-    Ground as StepGround, LinkId, Part, Refutation, RefutationPath, Refuted, StrongConflict,
+    EarliestStrategy, Ground as StepGround, LinkId, Part, Refutation, RefutationPath, Refuted,
+    StrongConflict,
 };
 
 use crate::cut::{Cut, EndSum, Ground, Length, ProofPart, ProofPath};
@@ -95,6 +96,9 @@ pub(crate) fn strategy_cuts(
     let Ok(network) = plan.uncertain_network(envelope) else {
         return CheckOutcome::Unknown;
     };
+    if EarliestStrategy::new(&network.network).is_some() {
+        return CheckOutcome::Accepted;
+    }
     let refuted = match network.network.to_integer_network() {
         Some(whole) => whole.network.refutations(most),
         None => network.network.refutations(most),

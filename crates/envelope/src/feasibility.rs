@@ -134,9 +134,27 @@ impl Feasibility {
             return Ok(corner.map(|sides| Infeasible::At(valuation(&sides, envelope))));
         }
         Ok(match moved {
-            Some(end) if !self.corners.is_empty() => self.tighten(envelope, end),
+            Some(end) if !self.corners.is_empty() => self.tighten(envelope, end, true),
             _ => self.rebuild(envelope),
         })
+    }
+
+    /// Does the same for a box that differs from the last feasible one only in `moved`, and keeps
+    /// the last feasible box.
+    pub(crate) fn infeasible_if_moved(
+        &mut self,
+        envelope: &DecoupledEnvelope,
+        moved: BoxEnd,
+    ) -> Result<Option<Infeasible>, TooManyBranches> {
+        if self.branches || self.corners.is_empty() || self.is_beyond_limit(envelope, moved) {
+            return self.clone().infeasible(envelope, Some(moved));
+        }
+        Ok(self.tighten(envelope, moved, false))
+    }
+
+    /// Returns `true` if the end is beyond a limit that applies to it alone.
+    fn is_beyond_limit(&self, envelope: &DecoupledEnvelope, end: BoxEnd) -> bool {
+        self.is_too_far(end, end.reach(envelope).as_ref())
     }
 
     /// Returns `true` if every box with this end at that reach contains values without a schedule,
@@ -249,7 +267,7 @@ impl Feasibility {
     }
 
     fn rebuild(&mut self, envelope: &DecoupledEnvelope) -> Option<Infeasible> {
-        let mut corners = vec![BTreeMap::new()];
+        let mut corners: Vec<BTreeMap<ParameterId, Side>> = vec![BTreeMap::new()];
         for (index, role) in self.roles.iter().enumerate() {
             let sides: &[Side] = match role {
                 Role::None => continue,
@@ -258,16 +276,22 @@ impl Feasibility {
                 Role::Both => &Side::BOTH,
             };
             let id = ParameterId::from(index);
-            corners = corners
-                .iter()
-                .flat_map(|corner: &BTreeMap<ParameterId, Side>| {
-                    sides.iter().map(move |&side| {
-                        let mut corner = corner.clone();
-                        corner.insert(id, side);
-                        corner
-                    })
+            // Most parameters have one side: a copy of each corner for each of them would take
+            // quadratic time.
+            if let [side] = *sides {
+                for corner in &mut corners {
+                    corner.insert(id, side);
+                }
+                continue;
+            }
+            let doubled = corners.into_iter().flat_map(|corner| {
+                sides.iter().map(move |&side| {
+                    let mut corner = corner.clone();
+                    corner.insert(id, side);
+                    corner
                 })
-                .collect();
+            });
+            corners = doubled.collect();
         }
         let mut built = Vec::with_capacity(corners.len());
         for sides in corners {
@@ -328,8 +352,14 @@ impl Feasibility {
         })
     }
 
-    /// Moves one end further out in all corners that use it; all of them or none.
-    fn tighten(&mut self, envelope: &DecoupledEnvelope, end: BoxEnd) -> Option<Infeasible> {
+    /// Moves one end further out in all corners that use it; all of them or none. The networks stay
+    /// as they were unless `keep` is set.
+    fn tighten(
+        &mut self,
+        envelope: &DecoupledEnvelope,
+        end: BoxEnd,
+        keep: bool,
+    ) -> Option<Infeasible> {
         let role = self.roles[end.parameter.index()];
         match role {
             Role::None => return None,
@@ -337,7 +367,7 @@ impl Feasibility {
             Role::Upper if end.side == Side::Lower => return None,
             // Both of a parameter's edges move, and one of them becomes looser, so the networks are
             // rebuilt.
-            Role::Both => return self.rebuild_corners(envelope, end),
+            Role::Both => return self.rebuild_corners(envelope, end, keep),
             Role::Lower | Role::Upper => {}
         }
         let mut tightened = Vec::new();
@@ -362,22 +392,27 @@ impl Feasibility {
             .iter()
             .map(|corner| corner.network.checkpoint())
             .collect();
-        for index in 0..self.corners.len() {
-            for constraint in &tightened {
-                if self.corners[index].network.add(constraint.clone()).is_err() {
-                    let values = valuation(&self.corners[index].sides, envelope);
-                    for (corner, checkpoint) in self.corners.iter_mut().zip(&checkpoints) {
-                        corner.network.undo_to(*checkpoint);
-                    }
-                    return Some(Infeasible::At(values));
-                }
+        let refused = self.corners.iter_mut().find_map(|corner| {
+            let mut added = tightened.iter().map(|own| corner.network.add(own.clone()));
+            let is_refused = added.any(|added| added.is_err());
+            is_refused.then(|| valuation(&corner.sides, envelope))
+        });
+        if refused.is_some() || !keep {
+            for (corner, checkpoint) in self.corners.iter_mut().zip(&checkpoints) {
+                corner.network.undo_to(*checkpoint);
             }
         }
-        None
+        refused.map(Infeasible::At)
     }
 
-    /// Rebuilds the networks of the corners that use the end; all of them or none.
-    fn rebuild_corners(&mut self, envelope: &DecoupledEnvelope, end: BoxEnd) -> Option<Infeasible> {
+    /// Rebuilds the networks of the corners that use the end; all of them or none, and none unless
+    /// `keep` is set.
+    fn rebuild_corners(
+        &mut self,
+        envelope: &DecoupledEnvelope,
+        end: BoxEnd,
+        keep: bool,
+    ) -> Option<Infeasible> {
         let mut rebuilt = Vec::new();
         for (index, corner) in self.corners.iter().enumerate() {
             if corner.sides.get(&end.parameter) == Some(&end.side) {
@@ -387,7 +422,7 @@ impl Feasibility {
                 }
             }
         }
-        for (index, network) in rebuilt {
+        for (index, network) in rebuilt.into_iter().filter(|_| keep) {
             self.corners[index].network = network;
         }
         None
@@ -396,13 +431,12 @@ impl Feasibility {
 
 /// Returns the values at a corner; parameters that do not matter have any value.
 fn valuation(sides: &BTreeMap<ParameterId, Side>, envelope: &DecoupledEnvelope) -> Valuation {
-    envelope
-        .intervals()
-        .iter()
-        .enumerate()
+    let mut sides = sides.iter().peekable();
+    let intervals = envelope.intervals().iter().enumerate();
+    intervals
         .map(|(index, interval)| {
-            let side = sides.get(&ParameterId::from(index));
-            end_or_finite(interval, side.copied().unwrap_or(Side::Lower))
+            let own = sides.next_if(|(id, _)| **id == ParameterId::from(index));
+            end_or_finite(interval, own.map_or(Side::Lower, |(_, side)| *side))
         })
         .collect()
 }

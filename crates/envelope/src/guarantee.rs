@@ -70,12 +70,37 @@ pub(crate) struct Control {
     /// Feasibility check, computed on first use. Values without any schedule are a better
     /// explanation of a rejection than a conflict. For many plans it is never needed.
     feasibility: OnceLock<Feasibility>,
+    /// The box that `feasibility` found feasible last, if objections to wider boxes were computed.
+    feasible: Option<DecoupledEnvelope>,
 }
 
 impl Control {
     fn feasibility(&self) -> &Feasibility {
         let make = || Feasibility::new(&self.plan, &Reduction::new(&self.plan));
         self.feasibility.get_or_init(make)
+    }
+
+    /// Returns values in the box without a schedule, if there are any and few enough cases.
+    ///
+    /// If `widened` is given, the box is that one, which is controllable, with the end moved out.
+    fn infeasible(
+        &mut self,
+        envelope: &DecoupledEnvelope,
+        widened: Option<(&DecoupledEnvelope, BoxEnd)>,
+    ) -> Option<Infeasible> {
+        self.feasibility();
+        let feasibility = self.feasibility.get_mut()?;
+        let Some((base, end)) = widened else {
+            return feasibility.clone().infeasible(envelope, None).ok()?;
+        };
+        if self.feasible.as_ref() != Some(base) {
+            self.feasible = None;
+            if let Some(found) = feasibility.infeasible(base, None).ok()? {
+                return Some(found);
+            }
+            self.feasible = Some(base.clone());
+        }
+        feasibility.infeasible_if_moved(envelope, end).ok()?
     }
 }
 
@@ -98,6 +123,7 @@ impl Controllability {
         let control = |feasibility: Option<Feasibility>| Control {
             plan: Arc::clone(plan),
             feasibility: feasibility.map(OnceLock::from).unwrap_or_default(),
+            feasible: None,
         };
         match guarantee {
             Guarantee::Weak => Self::Weak(
@@ -136,6 +162,37 @@ impl Controllability {
                 Ok(conflict.map(Uncontrollable::Conflict))
             }
         }
+    }
+
+    /// Returns `true` if the data kept are about this box, which was accepted last.
+    pub(crate) fn is_about(&self, envelope: &DecoupledEnvelope) -> bool {
+        match self {
+            Self::Dynamic(_, dynamic) => dynamic.is_about(envelope),
+            Self::Weak(_) | Self::Strong(_) => true,
+        }
+    }
+
+    /// Returns the reason why the box is rejected, if it is. It differs from the last accepted box
+    /// in the end `moved` only, and the data about that one stay as they are.
+    ///
+    /// # Errors
+    /// If there are too many cases to decide.
+    pub(crate) fn refuses_if_moved(
+        &mut self,
+        envelope: &DecoupledEnvelope,
+        moved: BoxEnd,
+    ) -> Result<Option<Uncontrollable>, Refusal> {
+        let conflict = match self {
+            Self::Weak(feasibility) => {
+                let found = feasibility.infeasible_if_moved(envelope, moved);
+                return Ok(found.map_err(too_many)?.map(Uncontrollable::Weak));
+            }
+            Self::Dynamic(control, dynamic) => {
+                dynamic.conflict_if_moved(&control.plan, envelope, moved.parameter)
+            }
+            Self::Strong(control) => strong_conflict(&control.plan, envelope),
+        };
+        Ok(conflict.map(Uncontrollable::Conflict))
     }
 
     /// Returns `true` if every box with this end at that reach contains values without a schedule,
@@ -181,23 +238,25 @@ impl Controllability {
     }
 
     /// Returns the objection, with values that show it.
+    ///
+    /// If `widened` is given, the box is that one, which is accepted, with the end moved out.
     pub(crate) fn objection(
-        &self,
+        &mut self,
         envelope: &DecoupledEnvelope,
         found: Uncontrollable,
+        widened: Option<(&DecoupledEnvelope, BoxEnd)>,
     ) -> Objection {
-        let feasibility = self.feasibility();
+        let found = match (found, &mut *self) {
+            (Uncontrollable::Weak(found), _) => Ok(found),
+            (
+                Uncontrollable::Conflict(conflict),
+                Self::Dynamic(control, _) | Self::Strong(control),
+            ) => control.infeasible(envelope, widened).ok_or(conflict),
+            (Uncontrollable::Conflict(conflict), Self::Weak(_)) => Err(conflict),
+        };
         match found {
-            Uncontrollable::Weak(found) => {
-                Objection::NoSchedule(feasibility.values(envelope, found))
-            }
-            Uncontrollable::Conflict(conflict) => {
-                let infeasible = feasibility.clone().infeasible(envelope, None);
-                match infeasible {
-                    Ok(Some(found)) => Objection::NoSchedule(feasibility.values(envelope, found)),
-                    _ => Objection::Uncontrollable(conflict),
-                }
-            }
+            Ok(found) => Objection::NoSchedule(self.feasibility().values(envelope, found)),
+            Err(conflict) => Objection::Uncontrollable(conflict),
         }
     }
 }

@@ -12,8 +12,9 @@ use elbowroom_num::Rational;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, Parameter, ParametrizedPlan};
 
 use crate::frontier::{Frontier, Growth};
+use crate::guarantee::Guarantee;
 use crate::objection::Objection;
-use crate::oracle::Oracle;
+use crate::oracle::{Oracle, Probe};
 use speculative::Speculation;
 
 /// Settings of IRR.
@@ -207,20 +208,20 @@ pub fn limits(
     on_limit: &mut dyn FnMut(BoxEnd, &Limit),
 ) {
     let plan = Arc::clone(oracle.plan());
-    oracle.accept_if_inside(envelope);
+    let mut probe = oracle.probe(envelope);
     for &end in ends {
         if flow().is_break() {
             break;
         }
         let (own, step) = (plan.parameter(end.parameter), &steps[end.parameter.index()]);
-        if let Some(limit) = limit(oracle, envelope, own, end, step) {
+        if let Some(limit) = limit((oracle, &mut probe), envelope, own, end, step) {
             on_limit(end, &limit);
         }
     }
 }
 
 fn limit(
-    oracle: &mut Oracle,
+    (oracle, probe): (&mut Oracle, &mut Option<Probe>),
     envelope: &DecoupledEnvelope,
     parameter: &Parameter,
     end: BoxEnd,
@@ -235,10 +236,18 @@ fn limit(
     }
     let target = &reach + step;
     let target = border.map_or(target.clone(), |border| border.min(target));
-    match oracle.objection_to_widening(envelope, end, Some(target)) {
+    let objection = match probe {
+        Some(probe) => probe.objection(oracle, (end, &reach, &target)),
+        None => oracle.objection_to_widening(envelope, end, Some(target)),
+    };
+    match objection {
         Ok(None) => {
             let is_far = &reach * &Rational::from(FAR_DIVISOR) > max_reach(parameter);
-            let is_any = is_far && oracle.accepts_all_finite(envelope, end).unwrap_or(false);
+            if !is_far || oracle.guarantee() != Guarantee::Strong {
+                return None;
+            }
+            let is_any = oracle.accepts_all_finite(envelope, end).unwrap_or(false);
+            *probe = oracle.probe(envelope);
             is_any.then_some(Limit::AnyFinite)
         }
         Ok(Some(objection)) => Some(Limit::Objection(objection)),

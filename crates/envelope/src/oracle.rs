@@ -1,6 +1,7 @@
 //! The exact box check.
 
 mod cut_generation;
+mod probe;
 mod proofs;
 
 use std::sync::Arc;
@@ -15,6 +16,8 @@ use crate::guarantee::{Controllability, Guarantee, Uncontrollable};
 use crate::objection::Objection;
 use crate::obligations::Refusal;
 use crate::soundness::{Broken, Conditions, Counterexample, Soundness};
+
+pub(crate) use probe::Probe;
 
 /// Decides whether a plan is guaranteed to work in a box: for all values in it there is a schedule,
 /// and every schedule is valid (paper 1, CHECKINENVELOPE and theorem 1). "There is a schedule" is
@@ -189,7 +192,7 @@ impl Oracle {
             self.accepted = Some(envelope.clone());
             self.has_accepted_proofs = true;
         }
-        Ok(reason.map(|reason| self.objection_of(envelope, reason)))
+        Ok(reason.map(|reason| self.objection_of(envelope, reason, None)))
     }
 
     /// Moves one end of the accepted box out to `reach` ([`BoxEnd::reach`]; `None` is infinitely
@@ -215,7 +218,7 @@ impl Oracle {
         reach: Option<Rational>,
     ) -> Result<Option<Objection>, Refusal> {
         let refused = self.widen(end, reach)?;
-        Ok(refused.map(|(envelope, reason)| self.objection_of(&envelope, reason)))
+        Ok(refused.map(|(envelope, reason)| self.objection_of(&envelope, reason, None)))
     }
 
     /// Returns the reason why the box is not inside the envelope; `None` if it is. The accepted box
@@ -231,7 +234,7 @@ impl Oracle {
         if reason.is_none() {
             self.has_accepted_proofs = self.accepted.as_ref() == Some(envelope);
         }
-        Ok(reason.map(|reason| self.objection_of(envelope, reason)))
+        Ok(reason.map(|reason| self.objection_of(envelope, reason, None)))
     }
 
     /// Returns `true` if it is proved that the box, with this end at any finite value further out, is
@@ -435,10 +438,19 @@ impl Oracle {
         Ok(None)
     }
 
-    fn objection_of(&self, envelope: &DecoupledEnvelope, reason: Reason) -> Objection {
+    /// Returns the objection with its values. `widened` is the accepted box and the end by which
+    /// the rejected one differs from it, if that is known.
+    fn objection_of(
+        &mut self,
+        envelope: &DecoupledEnvelope,
+        reason: Reason,
+        widened: Option<(&DecoupledEnvelope, BoxEnd)>,
+    ) -> Objection {
         match reason {
             Reason::NoSchedule(values) => Objection::NoSchedule(values),
-            Reason::Uncontrollable(found) => self.controllability.objection(envelope, found),
+            Reason::Uncontrollable(found) => {
+                self.controllability.objection(envelope, found, widened)
+            }
             Reason::Broken(broken) => Objection::Broken(broken),
         }
     }

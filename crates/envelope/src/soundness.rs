@@ -13,6 +13,7 @@ mod flow;
 mod half_space;
 mod lazy_network;
 mod linear_program;
+mod margins;
 mod proof;
 mod proof_export;
 mod scale;
@@ -35,6 +36,7 @@ use proof::Proof;
 use scale::Numbers;
 use violation_case::Outcome;
 
+pub(crate) use margins::ProofMargins;
 pub use sound_box::SoundBox;
 
 /// Decides, box by box, whether every schedule of a plan is valid.
@@ -58,6 +60,8 @@ pub(crate) struct Soundness {
     last_violated: usize,
     /// The number of bad cases refuted from scratch.
     refutations: usize,
+    /// `true` if new proofs do not replace the stored ones.
+    keeps_proofs: bool,
 }
 
 /// Bad case of a direct obligation with the proofs that it is impossible.
@@ -187,6 +191,7 @@ impl Soundness {
             numbers,
             last_violated: usize::MAX - 1,
             refutations: 0,
+            keeps_proofs: false,
         }))
     }
 
@@ -220,6 +225,21 @@ impl Soundness {
         Ok(found.pop())
     }
 
+    /// Does the same for a box that differs from the last one with the result `None` in `moved`
+    /// only, and keeps the proofs of that one.
+    pub(crate) fn broken_if_moved(
+        &mut self,
+        task: &Task,
+        plan: &ParametrizedPlan,
+        envelope: &DecoupledEnvelope,
+        moved: BoxEnd,
+    ) -> Result<Option<Broken>, Refusal> {
+        self.keeps_proofs = true;
+        let broken = self.broken(task, plan, envelope, Some(moved));
+        self.keeps_proofs = false;
+        broken
+    }
+
     /// Like [`broken`](Self::broken), but returns at most `most` obligations: if possible, those
     /// that give better reasons.
     ///
@@ -242,6 +262,7 @@ impl Soundness {
             numbers,
             last_violated: suspect,
             refutations,
+            keeps_proofs,
             ..
         } = self;
         let mut schedules = LazyNetwork::Unbuilt(reduction, envelope, numbers.as_ref());
@@ -270,6 +291,7 @@ impl Soundness {
             };
             *refutations += 1;
             match schedules.possible(&obligation.bad_cases[direct.case]) {
+                Outcome::Impossible(_) if *keeps_proofs => {}
                 Outcome::Impossible(proofs) => direct.proofs = Some(proofs),
                 Outcome::Possible => {
                     *suspect = index;
@@ -301,7 +323,7 @@ impl Soundness {
             return Ok(found);
         }
         let is_within = DecoupledEnvelope::ranges(plan).includes(envelope);
-        if is_within != *is_in_ranges {
+        if is_within != *is_in_ranges && !*keeps_proofs {
             *is_in_ranges = is_within;
             over_all.fill(None);
         }
@@ -322,6 +344,7 @@ impl Soundness {
             };
             *refutations += 1;
             match schedules.prove(task, plan, over_all, is_within, (proof.as_ref(), moved)) {
+                Ok(Ok(_)) if *keeps_proofs => {}
                 Ok(Ok(new)) => *proof = Some(new),
                 Ok(Err(case)) => {
                     found.push(Broken {

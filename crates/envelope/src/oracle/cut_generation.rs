@@ -151,9 +151,7 @@ impl Oracle {
             && let (Some(from), Some(to)) = (end.reach(envelope), &reach)
         {
             self.cut_pool.set_current_box(envelope);
-            if let Some(([row], Some(ground))) = self.cut_pool.refusing_rows(end, &from, Some(to))
-                && let Some(objection) = self.objection_of_row((row, ground), envelope, (end, to))
-            {
+            if let Some(objection) = self.known_objection(envelope, (end, &from, to)) {
                 self.checks += 1;
                 return Ok(Some(objection));
             }
@@ -164,9 +162,12 @@ impl Oracle {
         };
         // The stored proofs of the accepted box make it cheap to move one end.
         let reason = self.check_widened(&accepted, &candidate, end);
-        self.accepted = Some(accepted);
         self.has_accepted_proofs &= !matches!(reason, Ok(None));
-        Ok(reason?.map(|reason| self.objection_of(&candidate, reason)))
+        let widened = self.has_accepted_proofs.then_some((&accepted, end));
+        let objection =
+            reason.map(|reason| reason.map(|it| self.objection_of(&candidate, it, widened)));
+        self.accepted = Some(accepted);
+        objection
     }
 
     /// Makes a box the accepted one, if it is inside the envelope, in preparation of many queries
@@ -182,7 +183,7 @@ impl Oracle {
 
     /// Returns the known objection of a row to a box with one end moved out; `None` if none is
     /// stored and it has to be computed.
-    fn objection_of_row(
+    pub(super) fn objection_of_row(
         &self,
         (row, ground): (&Row, &Ground),
         envelope: &DecoupledEnvelope,

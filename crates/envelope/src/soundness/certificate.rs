@@ -67,6 +67,11 @@ impl Certificate {
         self
     }
 
+    /// Returns the ends of the sum, with their factors.
+    pub(crate) fn ends(&self) -> &[(BoxEnd, Rational)] {
+        &self.ends
+    }
+
     /// Returns `true` if the proof uses the end.
     pub(crate) fn depends_on(&self, end: BoxEnd) -> bool {
         let known = self.ends.binary_search_by_key(&end, |(own, _)| *own);

@@ -4,7 +4,9 @@ use std::fmt::Write as _;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use elbowroom_envelope::{Growth, Guarantee, Objection, Oracle, Settings, StopReason, irr};
+use elbowroom_envelope::{
+    Growth, Guarantee, Limit, Objection, Oracle, Settings, StopReason, irr, limits,
+};
 use elbowroom_model::Task;
 use elbowroom_num::{End, Rational};
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, ParametrizedPlan, Side};
@@ -279,6 +281,45 @@ fn objections(
     count
 }
 
+/// Compares the limits of all ends with the checks of a fresh oracle. Returns the number of ends
+/// that can move.
+fn movable_ends(
+    own: &mut Oracle,
+    fresh: &mut Oracle,
+    plan: &ParametrizedPlan,
+    envelope: &DecoupledEnvelope,
+) -> usize {
+    let mut count = 0;
+    let ends: Vec<BoxEnd> = BoxEnd::all(plan.parameters.len()).collect();
+    for distance in [Rational::new(1, 100), Rational::ONE] {
+        let steps = vec![distance.clone(); plan.parameters.len()];
+        let mut limited = Vec::new();
+        let mut record = |end, limit: &Limit| limited.push((end, limit.clone()));
+        let mut flow = || ControlFlow::Continue(());
+        limits(own, envelope, (&ends, &steps), &mut flow, &mut record);
+        for &end in &ends {
+            let limit = limited.iter().find(|(own, _)| *own == end);
+            let Some(reach) = end.reach(envelope) else {
+                assert!(matches!(limit, Some((_, Limit::Unbounded))));
+                continue;
+            };
+            let border = end.side.reach(&plan.parameter(end.parameter).range);
+            if border.as_ref() == Some(&reach) {
+                assert!(matches!(limit, Some((_, Limit::Range))));
+                continue;
+            }
+            let target = reach + &distance;
+            let target = border.map_or(target.clone(), |border| border.min(target));
+            let farther = end.with_reach(envelope, Some(target));
+            let expected = fresh.objection(&farther).expect("few cases");
+            let is_limited = matches!(limit, Some((_, Limit::Objection(_))));
+            assert_eq!(is_limited, expected.is_some(), "{end:?} {envelope:?}");
+            count += usize::from(expected.is_none());
+        }
+    }
+    count
+}
+
 fn task_and_plan(text: &str) -> (Arc<Task>, Arc<ParametrizedPlan>) {
     let given = Given {
         domain: DOMAIN,
@@ -333,6 +374,38 @@ fn speculative_search_takes_same_steps_as_sequential() {
         objected > 1_000 && long > 60 && limited > 60 && cancelled > 60 && without < 600,
         "{long} {limited} {cancelled} {without} {objected}"
     );
+}
+
+#[test]
+fn limits_agree_with_fresh_checks() {
+    let mut dice = Random(4);
+    let (mut movable, mut boxes) = (0, 0);
+    for round in 0..300 {
+        let text = if round < 200 {
+            plan_text(&mut dice)
+        } else {
+            plan_in_windows(&mut dice, 3 + round % 5)
+        };
+        let (task, plan) = task_and_plan(&text);
+        for guarantee in Guarantee::ALL {
+            let Ok(oracle) = Oracle::new(&task, &plan, guarantee) else {
+                continue;
+            };
+            let settings = Settings {
+                precision: Rational::new(1, [1, 4, 16][dice.below(3)]),
+                ..Settings::default()
+            };
+            let mut own = oracle.clone();
+            // A search cut short leaves ends that can move.
+            let most = [1_000, 1 + dice.below(30)][dice.below(2)];
+            let found = as_built(&mut own, &settings, most);
+            if let Some(envelope) = &found.envelope {
+                boxes += 1;
+                movable += movable_ends(&mut own, &mut oracle.clone(), &plan, envelope);
+            }
+        }
+    }
+    assert!(boxes > 200 && movable > 500, "{boxes} {movable}");
 }
 
 /// Returns the sum of the distances of ends from the nominal values, without ends that have no
