@@ -141,10 +141,14 @@ impl DynamicControl {
         envelope: &DecoupledEnvelope,
         moved: ParameterId,
     ) -> Option<ControlConflict> {
-        if let Some(kept) = &mut self.last_network
-            && let Some(decided) = kept.probe(moved, envelope.interval(moved))
-        {
-            return decided.map(|grounds| translate_conflict(plan, &kept.network, &grounds));
+        if let Some(kept) = &mut self.last_network {
+            match kept.probe(moved, envelope.interval(moved)) {
+                Rechecked::Controllable => return None,
+                Rechecked::Refused(grounds) => {
+                    return Some(translate_conflict(plan, &kept.network, &grounds));
+                }
+                Rechecked::Unknown => {}
+            }
         }
         // The parameter is used elsewhere, or its bounds are large.
         Self::default().conflict(plan, envelope)
@@ -180,23 +184,30 @@ impl CheckedNetwork {
         }
     }
 
-    /// Returns the conflict that arises if a parameter has this interval, if there is one; `None`
-    /// if that cannot be checked here. The network stays as it is.
-    fn probe(&mut self, moved: ParameterId, interval: &Interval) -> Option<Option<Vec<Ground>>> {
-        let link = self.links[moved.index()]?;
+    /// Checks a box that differs from the kept one in this interval only. The network stays as it
+    /// is.
+    fn probe(&mut self, moved: ParameterId, interval: &Interval) -> Rechecked {
+        let Some(link) = self.links[moved.index()] else {
+            return Rechecked::Unknown;
+        };
         if self.is_early_enough(link, interval) {
-            return Some(None);
+            return Rechecked::Controllable;
         }
         let old = self.envelope.interval(moved).clone();
-        let (unit, check) = self.full_check()?;
-        let (lower, upper) = bounds(unit, interval)?;
-        let (old_lower, old_upper) = bounds(unit, &old)?;
+        let Some((unit, check)) = self.full_check() else {
+            return Rechecked::Unknown;
+        };
+        let (Some((lower, upper)), Some((old_lower, old_upper))) =
+            (bounds(unit, interval), bounds(unit, &old))
+        else {
+            return Rechecked::Unknown;
+        };
         if let Err(conflict) = check.change(link, lower, upper) {
-            return Some(Some(grounds_of(&conflict)));
+            return Rechecked::Refused(grounds_of(&conflict));
         }
         let restored = check.change(link, old_lower, old_upper);
         debug_assert!(restored.is_ok(), "the kept box is controllable");
-        Some(None)
+        Rechecked::Controllable
     }
 
     /// Returns `true` if it is known that starting everything as early as possible suffices for

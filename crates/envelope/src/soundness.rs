@@ -25,9 +25,7 @@ use elbowroom_num::Rational;
 use elbowroom_stn::ConsistentNetwork;
 
 use crate::linear::Linear;
-use crate::obligations::{
-    BadCase, Difference, Obligations, OverAll, Refusal, Requirement, ensure_not_stopped,
-};
+use crate::obligations::{BadCase, Difference, Obligations, OverAll, Refusal, Requirement};
 use crate::reduction::Reduction;
 use certificate::Certificate;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, NodeId, ParametrizedPlan, Schedule, Valuation};
@@ -285,8 +283,7 @@ impl Soundness {
             if is_enough && !is_separation || direct.proofs_hold(envelope, moved) {
                 continue;
             }
-            ensure_not_stopped()?;
-            let Some(schedules) = schedules.get() else {
+            let Some(schedules) = schedules.get()? else {
                 return Ok(Vec::new());
             };
             *refutations += 1;
@@ -316,11 +313,8 @@ impl Soundness {
                 Outcome::Unknown(_) => {}
             }
         }
-        if !apart.is_empty() {
-            return Ok(apart);
-        }
-        if !found.is_empty() {
-            return Ok(found);
+        if !apart.is_empty() || !found.is_empty() {
+            return Ok(if apart.is_empty() { found } else { apart });
         }
         let is_within = DecoupledEnvelope::ranges(plan).includes(envelope);
         if is_within != *is_in_ranges && !*keeps_proofs {
@@ -338,8 +332,7 @@ impl Soundness {
             {
                 continue;
             }
-            ensure_not_stopped()?;
-            let Some(schedules) = schedules.get() else {
+            let Some(schedules) = schedules.get()? else {
                 return Ok(Vec::new());
             };
             *refutations += 1;

@@ -152,7 +152,7 @@ impl<'a> Allotment<'a> {
             let Some(here) = self.expand(point, weight) else {
                 return;
             };
-            let Some(step) = newton_step(here.hessian, &here.gradient) else {
+            let Some(step) = newton_step(&here.hessian, &here.gradient) else {
                 return;
             };
             let decrease: f64 = step.iter().zip(&here.gradient).map(|(a, b)| -a * b).sum();
@@ -197,7 +197,7 @@ impl<'a> Allotment<'a> {
                 continue;
             }
             let [lower, upper] = self.interval(link, point);
-            let mass = law.mass([lower, upper]).mass;
+            let mass = law.mass([lower, upper]).probability;
             if lower >= upper || mass <= 0.0 {
                 return None;
             }
@@ -237,8 +237,14 @@ impl<'a> Allotment<'a> {
             let interval = self.interval(link, point);
             let mass = law.mass(interval);
             // Relative densities with the sign of their effect on the probability.
-            let share = [-mass.density[0] / mass.mass, mass.density[1] / mass.mass];
-            let slope = [-mass.slope[0] / mass.mass, mass.slope[1] / mass.mass];
+            let share = [
+                -mass.density[0] / mass.probability,
+                mass.density[1] / mass.probability,
+            ];
+            let slope = [
+                -mass.slope[0] / mass.probability,
+                mass.slope[1] / mass.probability,
+            ];
             let reach = [interval[0] - law.least, interval[1] - law.most];
             for end in 0..2 {
                 let Some(at) = self.positions[link][end] else {
@@ -277,10 +283,10 @@ impl<'a> Allotment<'a> {
 
 /// Solves `hessian * step = -gradient` by Cholesky decomposition. A multiple of the diagonal is
 /// added until the matrix is positive definite.
-fn newton_step(hessian: Vec<Vec<f64>>, gradient: &[f64]) -> Option<Vec<f64>> {
+fn newton_step(hessian: &[Vec<f64>], gradient: &[f64]) -> Option<Vec<f64>> {
     let mut damping = 0.0;
     for _ in 0..12 {
-        let mut matrix = hessian.clone();
+        let mut matrix = hessian.to_vec();
         for (row, line) in matrix.iter_mut().enumerate() {
             line[row] *= 1.0 + damping;
         }

@@ -149,7 +149,8 @@ impl BestBox {
             .map(|(law, link)| {
                 let upper = link.upper.as_ref().map(Rational::to_f64);
                 let interval = [link.lower.to_f64(), upper.unwrap_or(f64::INFINITY)];
-                law.as_ref().map_or(1.0, |law| law.mass(interval).mass)
+                law.as_ref()
+                    .map_or(1.0, |law| law.mass(interval).probability)
             })
             .collect();
         let together = |links: &mut dyn Iterator<Item = usize>| {

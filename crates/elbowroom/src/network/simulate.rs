@@ -75,12 +75,12 @@ pub(super) fn run(
     let mut outside = 0;
     let mut broken: BTreeMap<ConstraintId, u64> = BTreeMap::new();
     for number in 0..simulation.runs {
-        let drawn = draws.run(number);
-        outside += u64::from(is_outside(file, &drawn));
+        let lengths = draws.run(number);
+        outside += u64::from(is_outside(file, &lengths));
         // Without a schedule there is nothing to execute.
         let schedule = executor
             .as_ref()
-            .and_then(|executor| dispatch::run(&file.network, executor, &drawn));
+            .and_then(|executor| dispatch::run(&file.network, executor, &lengths));
         let requirements = file.network.requirements();
         let mut is_kept = schedule.is_some();
         for id in requirements.constraint_ids() {

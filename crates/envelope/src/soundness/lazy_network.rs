@@ -5,7 +5,7 @@ use elbowroom_model::Task;
 use super::proof::{Proof, ProofResult, Prover};
 use super::scale::{ExactScale, IntegerScale, Numbers};
 use super::violation_case::{Outcome, Schedules};
-use crate::obligations::{BadCase, Obligations, OverAll, Refusal};
+use crate::obligations::{BadCase, Obligations, OverAll, Refusal, ensure_not_stopped};
 use crate::reduction::Reduction;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan};
 
@@ -19,15 +19,19 @@ pub(crate) enum LazyNetwork<'a> {
 
 impl<'a> LazyNetwork<'a> {
     /// Returns the network; `None` if the box has no schedule.
-    pub(crate) fn get(&mut self) -> Option<&mut AnySchedules<'a>> {
+    ///
+    /// # Errors
+    /// After a stop request.
+    pub(crate) fn get(&mut self) -> Result<Option<&mut AnySchedules<'a>>, Refusal> {
+        ensure_not_stopped()?;
         if let Self::Unbuilt(reduction, envelope, numbers) = *self {
             *self =
                 AnySchedules::new(reduction, envelope, numbers).map_or(Self::Empty, Self::Built);
         }
-        match self {
+        Ok(match self {
             Self::Built(schedules) => Some(schedules),
             Self::Unbuilt(..) | Self::Empty => None,
-        }
+        })
     }
 }
 

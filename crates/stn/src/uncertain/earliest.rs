@@ -215,7 +215,7 @@ mod tests {
     use crate::uncertain::ContingentLink;
     use crate::{Constraint, Network};
 
-    /// Pseudorandom numbers: SplitMix64 (Steele, Lea and Flood, 2014).
+    /// Pseudorandom numbers: `SplitMix64` (Steele, Lea and Flood, 2014).
     struct Random(u64);
 
     impl Random {
