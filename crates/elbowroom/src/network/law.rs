@@ -290,7 +290,7 @@ mod tests {
         );
         close(
             normal.mass([15.0, 18.0]).probability,
-            3.167_025_573_499_8e-5,
+            3.167_025_524_547_488e-5,
         );
         close(
             exponential.mass([0.0, 3.0]).probability,
