@@ -11,6 +11,7 @@ times, or with less than a millisecond between happenings, is also accepted: `--
 """
 
 import argparse
+import contextlib
 import csv
 import os
 import pathlib
@@ -73,6 +74,10 @@ def solve(program, command, domain, problem, seconds):
             except subprocess.TimeoutExpired:
                 os.killpg(process.pid, signal.SIGKILL)
                 text, _ = process.communicate()
+        finally:
+            # Also if this program is interrupted.
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
         took = time.monotonic() - begun
         texts = [text] + [path.read_text(errors="replace") for path in sorted(folder.glob("plan*"))]
         plans = sorted((steps for text in texts for steps in plans_in(text)), key=length)
